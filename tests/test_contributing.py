@@ -1,6 +1,7 @@
-"""The table of CONTRIBUTING.md names files and folders that exist."""
+"""The table of CONTRIBUTING.md names files and folders that exist, and the crates import in its directions."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,19 @@ def test_every_named_path_exists(row: str) -> None:
         folders += [path] if path.is_dir() else [path.parent]
         # A file names the folder of its parts: beam.rs and beam/traversal.rs.
         folders += [path.with_suffix("")] if path.with_suffix("").is_dir() else []
+
+
+def test_crates_depend_only_downwards() -> None:
+    line = next(line for line in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").splitlines() if line.startswith("* Rust:"))
+    chains = [chain.split(" > ") for chain in re.findall(r"`(\w+(?: > \w+)+)`", line)]
+    below: dict[str, set[str]] = {}
+    for upper, lower in ((upper, lower) for chain in chains for k, upper in enumerate(chain) for lower in chain[k + 1 :]):
+        below.setdefault(upper, set()).update({lower}, below.get(lower, set()))
+    for manifest in (ROOT / "crates").glob("*/Cargo.toml"):
+        name = manifest.parent.name.removeprefix("map3d-")
+        used = {one.removeprefix("map3d-") for one in tomllib.loads(manifest.read_text())["dependencies"] if one.startswith("map3d-")}
+        assert used <= below.get(name, set()), f"{name} depends on {used - below.get(name, set())}"
+    assert "build" not in below["trace"]
 
 
 def test_the_table_is_read() -> None:

@@ -163,7 +163,7 @@ def xml_root(head: bytes) -> str | None:
 def check_file(path: str) -> None:
     """Raises FormatError unless a mesh, chunk, instance or texture file has a known version and the checksum of its header."""
 
-# -- build: assets → chunks and textures (map3d-scene, map3d-image) ---------------------------------------------------------------
+# -- build: assets → chunks and textures (map3d-build) ---------------------------------------------------------------
 
 Progress = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop; the build then raises `Interrupted` and keeps finished files."""

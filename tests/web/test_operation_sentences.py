@@ -95,14 +95,14 @@ def test_a_text_without_a_sentence_is_found(tmp_path: Path) -> None:
 
 
 def test_every_stage_of_the_core_has_a_sentence() -> None:
-    sources = [path.read_text("utf-8") for crate in ("map3d-scene", "map3d-texture") for path in (CRATES / crate / "src").rglob("*.rs")]
+    sources = [path.read_text("utf-8") for crate in ("map3d-build", "map3d-texture") for path in (CRATES / crate / "src").rglob("*.rs")]
     stages = {stage for source in sources for stage in re.findall(r'\bprogress\)?\("(\w+)"', source)}
     assert stages >= {"chunks", "textures"}
     assert stages <= set(SENTENCES)
 
 
 def test_every_count_of_a_build_has_a_sentence() -> None:
-    report = (CRATES / "map3d-scene" / "src" / "builder" / "report.rs").read_text("utf-8")
+    report = (CRATES / "map3d-build" / "src" / "report.rs").read_text("utf-8")
     names = re.findall(r"pub (\w+): u64", report)
     assert names
     assert [name for name in names if find_sentence(f"7 {name.replace('_', ' ')}") is None] == []

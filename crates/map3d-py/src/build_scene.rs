@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use map3d_scene::builder::{self, BuildRequest};
+use map3d_build::BuildRequest;
 use pyo3::prelude::*;
 
 use crate::errors::{invalid, to_python};
@@ -24,7 +24,7 @@ pub fn build_scene(py: Python<'_>, folder: PathBuf, request: &str, progress: Opt
             false
         })
     };
-    let report = py.detach(|| builder::build_scene(&folder, &request, &mut report_progress));
+    let report = py.detach(|| map3d_build::build_scene(&folder, &request, &mut report_progress));
     match failure {
         Some(error) => Err(error),
         None => report.map(|r| serde_json::to_string(&r).expect("reports are plain data")).map_err(to_python),

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use map3d_base::Vec3;
-use map3d_scene::builder::BuildOptions;
-use map3d_scene::content::Content;
+use map3d_build::BuildOptions;
+use map3d_build::content::Content;
 use pyo3::prelude::*;
 use serde_json::json;
 

@@ -8,9 +8,9 @@ use std::path::Path;
 use map3d_base::Vec3;
 use map3d_base::asset::{AssetReport, AssetWriter, Batch, Material, Materials, Object, Rank};
 use map3d_base::vec3::{add, cross, normalized, scale, sub};
+use map3d_build::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 use map3d_image::Raster;
 use map3d_image::encode::encode_jpeg;
-use map3d_scene::builder::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 
 const SIDE_M: f64 = 1800.0;
 const TEXEL_M: f64 = 0.05;

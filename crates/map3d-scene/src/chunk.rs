@@ -13,7 +13,7 @@ use crate::records::{
 
 /// Section offsets in bytes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sections {
+pub struct Sections {
     pub nodes: usize,
     pub leaves: usize,
     pub triangles: usize,

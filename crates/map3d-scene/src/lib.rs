@@ -1,9 +1,7 @@
-//! Scenes: builds chunks with a BVH from assets (`builder`) and maps them for tracing (`SceneStore`). File formats: spec/scene.md.
+//! Built scenes, mapped for tracing (`SceneStore`): chunks, instances, the index, and the BVH. File formats: spec/scene.md. `map3d-build` writes them.
 
-pub mod builder;
 pub mod bvh;
 pub mod chunk;
-pub mod content;
 pub mod index;
 pub mod instances;
 pub mod lattice;

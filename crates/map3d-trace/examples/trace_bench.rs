@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use map3d_base::asset::{AssetReport, AssetWriter, Batch, Material, Materials, Object, Rank};
 use map3d_base::{Frame, Vec3};
+use map3d_build::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 use map3d_scene::SceneStore;
-use map3d_scene::builder::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 use map3d_trace::{BeamTracer, IgnoreCutouts, Isa, SUBTILE_PX};
 
 const TOWN_M: f64 = 1800.0;

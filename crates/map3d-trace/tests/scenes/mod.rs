@@ -8,10 +8,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use map3d_base::asset::{AssetReport, AssetWriter, Batch, Instance, Material, Materials, Object, Rank};
 use map3d_base::{Frame, Vec3};
+use map3d_build::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 use map3d_image::Raster;
 use map3d_image::encode::{Deflate, Filter, encode_png};
 use map3d_scene::SceneStore;
-use map3d_scene::builder::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 
 pub const RANKS: [Rank; 6] = [Rank::Terrain, Rank::Road, Rank::Ground, Rank::Other, Rank::Installation, Rank::Opening];
 

@@ -3,13 +3,13 @@
 use std::collections::HashMap;
 
 use map3d_base::{Extent, Vec3, vec3};
+use map3d_scene::lattice::{Point, snap};
 
-use super::assets::Asset;
-use super::materials::BuildMaterials;
-use super::report::BuildReport;
-use super::request::BuildOptions;
-use super::triangle::BuildTriangle;
-use crate::lattice::{Point, snap};
+use crate::assets::Asset;
+use crate::materials::BuildMaterials;
+use crate::report::BuildReport;
+use crate::request::BuildOptions;
+use crate::triangle::BuildTriangle;
 
 /// Triangles, of about 60 bytes each, after which the resident pages of an asset's mesh are dropped.
 const TRIANGLES_PER_RELEASE: usize = 1 << 20;
@@ -17,7 +17,7 @@ const TRIANGLES_PER_RELEASE: usize = 1 << 20;
 const PROTOTYPE_ID: u32 = 1;
 
 /// Reads the triangles of assets as those of chunks.
-pub(super) struct TriangleSource<'a> {
+pub(crate) struct TriangleSource<'a> {
     pub assets: &'a [&'a Asset],
     pub materials: &'a BuildMaterials,
     pub options: &'a BuildOptions,

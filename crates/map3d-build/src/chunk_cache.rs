@@ -7,17 +7,16 @@ use std::path::Path;
 
 use bytemuck::Zeroable;
 use map3d_base::{Error, Result};
+use map3d_scene::chunk::Sections;
+use map3d_scene::index::{Cell, ChunkEntry};
+use map3d_scene::records::{CHUNK_MAGIC, ChunkHeader, VERSION};
 
-use crate::chunk::Sections;
-use crate::index::{Cell, ChunkEntry};
-use crate::records::{CHUNK_MAGIC, ChunkHeader, VERSION};
+pub(crate) const CHUNKS: &str = "chunks";
 
-pub(super) const CHUNKS: &str = "chunks";
-
-pub(super) struct ChunkCache(HashMap<[u64; 2], Vec<CachedChunk>>);
+pub(crate) struct ChunkCache(HashMap<[u64; 2], Vec<CachedChunk>>);
 
 #[derive(Clone)]
-pub(super) struct CachedChunk {
+pub(crate) struct CachedChunk {
     pub entry: ChunkEntry,
     pub header: ChunkHeader,
 }
@@ -46,7 +45,7 @@ impl ChunkCache {
 }
 
 /// Reads the header of a chunk; `None` unless version and length are right.
-pub(super) fn read_cached_chunk(folder: &Path, name: &str, cell: Option<Cell>) -> Option<CachedChunk> {
+pub(crate) fn read_cached_chunk(folder: &Path, name: &str, cell: Option<Cell>) -> Option<CachedChunk> {
     let mut file = File::open(folder.join(name)).ok()?;
     let bytes = file.metadata().ok()?.len();
     let mut header = ChunkHeader::zeroed();

@@ -4,15 +4,15 @@ use std::collections::HashMap;
 
 use map3d_base::Result;
 use map3d_base::asset::{Material, SurfaceClass};
+use map3d_scene::records::{MATERIAL_CUTOUT, MATERIAL_TEXTURED, MaterialRecord};
 use map3d_texture::TextureKeys;
 
-use super::BuildOptions;
-use super::asset_summary::record_hash;
-use super::assets::Asset;
-use super::looks::Looks;
-use crate::records::{MATERIAL_CUTOUT, MATERIAL_TEXTURED, MaterialRecord};
+use crate::BuildOptions;
+use crate::asset_summary::record_hash;
+use crate::assets::Asset;
+use crate::looks::Looks;
 
-pub(super) struct BuildMaterials {
+pub(crate) struct BuildMaterials {
     pub records: Vec<MaterialRecord>,
     /// Per asset.
     assets: Vec<AssetMaterials>,

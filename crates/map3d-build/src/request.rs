@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use map3d_base::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::looks::StyleRule;
 use crate::content::Choice;
+use crate::looks::StyleRule;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -104,7 +104,7 @@ impl BuildRequest {
         Ok(request)
     }
 
-    pub(super) fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         if !self.origin.iter().all(|v| v.is_finite()) {
             return Err(Error::argument("build request: origin must be finite"));
         }
@@ -115,15 +115,15 @@ impl BuildRequest {
         }
     }
 
-    pub(super) fn asset_folders(&self, folder: &Path) -> Vec<PathBuf> {
+    pub(crate) fn asset_folders(&self, folder: &Path) -> Vec<PathBuf> {
         self.assets.iter().map(|name| folder.join("assets").join(name)).collect()
     }
 
-    pub(super) fn memory_bytes(&self) -> u64 {
+    pub(crate) fn memory_bytes(&self) -> u64 {
         if self.max_memory_bytes == 0 { DEFAULT_MEMORY_BYTES } else { self.max_memory_bytes }
     }
 
-    pub(super) fn thread_count(&self) -> usize {
+    pub(crate) fn thread_count(&self) -> usize {
         if self.threads == 0 { std::thread::available_parallelism().map_or(1, usize::from) } else { self.threads }
     }
 }

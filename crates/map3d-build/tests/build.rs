@@ -3,7 +3,7 @@
 use crate::fixture::{Face, batch, bytes_of, new_folder, request, run, tent, tent_grid, world, write_asset, write_faces};
 use map3d_base::Error;
 use map3d_base::asset::{Instance, Material, Materials, Rank};
-use map3d_scene::builder::{BuildOptions, BuildRequest, GroundPlane, build_scene};
+use map3d_build::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 use map3d_scene::{Chunk, SceneStore};
 
 #[test]

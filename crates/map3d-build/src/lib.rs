@@ -1,4 +1,5 @@
 //! Builds a scene from its assets: optimises and snaps triangles, sorts them into cells and writes each cell with its BVH to a file (spec/scene.md).
+//! `map3d-scene` maps what is built.
 
 mod asset_summary;
 mod assets;
@@ -7,6 +8,7 @@ mod build_scene;
 mod cells;
 mod chunk_cache;
 mod chunks;
+pub mod content;
 mod encode;
 mod files;
 mod ground;

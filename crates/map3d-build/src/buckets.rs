@@ -6,13 +6,13 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use map3d_base::{Error, Result};
+use map3d_scene::index::Cell;
 
-use super::triangle::BuildTriangle;
-use crate::index::Cell;
+use crate::triangle::BuildTriangle;
 
 const READ_BYTES: usize = 1 << 20;
 
-pub(super) struct TriangleBuckets {
+pub(crate) struct TriangleBuckets {
     folder: PathBuf,
     memory: BTreeMap<Cell, Vec<BuildTriangle>>,
     held: usize,

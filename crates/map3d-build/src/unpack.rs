@@ -5,14 +5,14 @@ use std::path::Path;
 
 use bytemuck::Zeroable;
 use map3d_base::Result;
+use map3d_scene::chunk::Chunk;
+use map3d_scene::lattice::{Point, snap};
+use map3d_scene::records::MaterialRecord;
 
-use super::triangle::BuildTriangle;
-use crate::chunk::Chunk;
-use crate::lattice::{Point, snap};
-use crate::records::MaterialRecord;
+use crate::triangle::BuildTriangle;
 
 /// Material records by number; equal records have one number.
-pub(super) struct MaterialNumbers {
+pub(crate) struct MaterialNumbers {
     pub records: Vec<MaterialRecord>,
     numbers: HashMap<MaterialRecord, u32>,
 }
@@ -31,7 +31,7 @@ impl MaterialNumbers {
 }
 
 /// Appends the triangles of the objects that `wanted` accepts.
-pub(super) fn unpack_chunk(path: &Path, materials: &mut MaterialNumbers, wanted: impl Fn(u32) -> bool, out: &mut Vec<BuildTriangle>) -> Result<()> {
+pub(crate) fn unpack_chunk(path: &Path, materials: &mut MaterialNumbers, wanted: impl Fn(u32) -> bool, out: &mut Vec<BuildTriangle>) -> Result<()> {
     let chunk = Chunk::open(path, true)?;
     let numbers: Vec<u32> = chunk.materials().iter().map(|m| materials.number(m)).collect();
     let objects: Vec<Option<u32>> = chunk.objects().iter().map(|o| Some(o.id).filter(|id| wanted(*id))).collect();

@@ -6,9 +6,9 @@ use std::collections::BTreeSet;
 use bytemuck::Zeroable;
 use map3d_base::asset::Rank;
 use map3d_base::{Box3, Error, Result};
+use map3d_scene::lattice::{Point, metres, snap};
 
-use super::triangle::BuildTriangle;
-use crate::lattice::{Point, metres, snap};
+use crate::triangle::BuildTriangle;
 
 /// The diagonal of a square of the plane's grid stays below the length at which edges are split.
 const GRID_M: f64 = 700.0;
@@ -19,11 +19,11 @@ const SMALL_MARGIN: f64 = 0.25;
 /// Squares of a plane under the whole box; with more, only those near content remain.
 const MAX_SQUARES: f64 = 65_536.0;
 /// Squares of all planes.
-pub(super) const MAX_ALL_SQUARES: usize = 500_000;
+pub(crate) const MAX_ALL_SQUARES: usize = 500_000;
 
 /// Extent and ground height of content.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct GroundLevel {
+pub(crate) struct GroundLevel {
     pub bounds: Box3,
     pub has_terrain: bool,
     /// Lowest point of ground surfaces, if there are any.
@@ -133,7 +133,7 @@ fn squares([x, y]: &[GridAxis; 2], content: &mut dyn Iterator<Item = Box3>, limi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lattice::is_long;
+    use map3d_scene::lattice::is_long;
 
     #[test]
     fn the_plane_extends_beyond_the_box_and_has_short_edges() {

@@ -8,12 +8,12 @@ use map3d_base::asset::Material;
 use map3d_base::{Error, Result};
 use map3d_texture::{TextureAsset, TextureFile, TextureKeys, TextureSource, build_textures, texture_path, texture_source};
 
-use super::assets::{Asset, Assets};
-use super::{BuildReport, BuildRequest, Progress};
+use crate::assets::{Asset, Assets};
+use crate::{BuildReport, BuildRequest, Progress};
 
 /// Builds the textures of assets without a summary and of assets that share an image with them; returns the keys of all textures. Invalidates
 /// summaries that name another key of one of their textures.
-pub(super) fn build_changed(
+pub(crate) fn build_changed(
     folder: &Path,
     assets: &mut Assets,
     request: &BuildRequest,
@@ -41,9 +41,9 @@ pub(super) fn build_changed(
 /// Returns the sources whose mask or image may have changed, and those without a file of today's version.
 fn find_stale_sources(assets: &mut Assets, out_dir: &Path) -> Result<BTreeSet<TextureSource>> {
     let mut stale: BTreeSet<TextureSource> =
-        assets.previous().flat_map(|s| &s.details.textures).map(super::asset_summary::SummaryTexture::source).collect();
+        assets.previous().flat_map(|s| &s.details.textures).map(crate::asset_summary::SummaryTexture::source).collect();
     let is_there = |key: Option<[u8; 16]>| key.is_some_and(|k| TextureFile::open_header(&texture_path(out_dir, &k)).is_ok());
-    stale.extend(assets.summaries().flat_map(|s| &s.details.textures).filter(|t| !is_there(t.key)).map(super::asset_summary::SummaryTexture::source));
+    stale.extend(assets.summaries().flat_map(|s| &s.details.textures).filter(|t| !is_there(t.key)).map(crate::asset_summary::SummaryTexture::source));
     for k in assets.without_summary() {
         stale.extend(used_sources(assets.open(k)?));
     }
@@ -51,7 +51,7 @@ fn find_stale_sources(assets: &mut Assets, out_dir: &Path) -> Result<BTreeSet<Te
 }
 
 /// Returns the sources that triangles of an asset use.
-pub(super) fn used_sources(asset: &Asset) -> BTreeSet<TextureSource> {
+pub(crate) fn used_sources(asset: &Asset) -> BTreeSet<TextureSource> {
     let mut used = vec![false; asset.materials.len()];
     asset.mesh.materials().iter().for_each(|m| used[*m as usize] = true);
     asset.mesh.release();

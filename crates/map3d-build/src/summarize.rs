@@ -4,20 +4,20 @@ use std::path::Path;
 
 use map3d_base::asset::AssetMesh;
 use map3d_base::{Error, Result, Vec3, vec3};
+use map3d_scene::lattice::{metres, snap};
 use map3d_texture::TextureKeys;
 use twox_hash::XxHash3_64;
 
-use super::asset_summary::{AssetDetails, AssetSummary, SummaryTexture};
-use super::chunk_cache::CHUNKS;
-use super::files::write_if_changed;
-use super::ground::GroundLevel;
-use super::triangle::BuildTriangle;
-use super::triangle_source::TriangleSource;
-use super::{BuildReport, BuildRequest, prototypes, textures};
-use crate::lattice::{metres, snap};
+use crate::asset_summary::{AssetDetails, AssetSummary, SummaryTexture};
+use crate::chunk_cache::CHUNKS;
+use crate::files::write_if_changed;
+use crate::ground::GroundLevel;
+use crate::triangle::BuildTriangle;
+use crate::triangle_source::TriangleSource;
+use crate::{BuildReport, BuildRequest, prototypes, textures};
 
 /// Summarizes an asset except for its cells; writes its prototypes.
-pub(super) fn summarize_asset(
+pub(crate) fn summarize_asset(
     folder: &Path,
     request: &BuildRequest,
     source: &TriangleSource,

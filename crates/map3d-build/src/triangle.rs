@@ -1,8 +1,7 @@
 //! A triangle before it becomes part of a chunk: snapped, with short edges.
 
 use bytemuck::{Pod, Zeroable};
-
-use crate::lattice::{Point, STEPS_PER_M, has_no_area, is_long, midpoint};
+use map3d_scene::lattice::{Point, STEPS_PER_M, has_no_area, is_long, midpoint};
 
 /// Plain data, so that it can be written to a file as it is.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]

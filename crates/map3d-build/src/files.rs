@@ -6,7 +6,7 @@ use std::path::Path;
 use map3d_base::{Error, Result};
 
 /// Writes a temporary file and renames it; returns false when the file already has these bytes.
-pub(super) fn write_if_changed(path: &Path, bytes: &[u8]) -> Result<bool> {
+pub(crate) fn write_if_changed(path: &Path, bytes: &[u8]) -> Result<bool> {
     if fs::metadata(path).is_ok_and(|m| m.len() == bytes.len() as u64) && fs::read(path).is_ok_and(|old| old == bytes) {
         return Ok(false);
     }
@@ -22,7 +22,7 @@ pub(super) fn write_if_changed(path: &Path, bytes: &[u8]) -> Result<bool> {
 }
 
 /// Removes the files of a folder that `keep` rejects.
-pub(super) fn prune(folder: &Path, keep: impl Fn(&str) -> bool) -> Result<()> {
+pub(crate) fn prune(folder: &Path, keep: impl Fn(&str) -> bool) -> Result<()> {
     let entries = match fs::read_dir(folder) {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
         other => other.map_err(|e| Error::storage(folder, e))?,

@@ -3,21 +3,21 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use map3d_base::{Box3, Result, Vec3};
+use map3d_scene::index::ChunkEntry;
+use map3d_scene::lattice::Point;
+use map3d_scene::records::InstanceRecord;
 use twox_hash::XxHash3_128;
 
-use super::encode::{ChunkFile, ChunkInput, content_hash, encode_chunk};
-use super::report::BuildReport;
-use super::triangle::BuildTriangle;
-use super::triangle_source::TriangleSource;
-use crate::index::ChunkEntry;
-use crate::lattice::Point;
-use crate::records::InstanceRecord;
+use crate::encode::{ChunkFile, ChunkInput, content_hash, encode_chunk};
+use crate::report::BuildReport;
+use crate::triangle::BuildTriangle;
+use crate::triangle_source::TriangleSource;
 
 /// Triangles by the asset's prototype number; ordered, so that every build numbers them alike.
-pub(super) type Prototypes = BTreeMap<u32, Vec<BuildTriangle>>;
+pub(crate) type Prototypes = BTreeMap<u32, Vec<BuildTriangle>>;
 
 /// Collects the prototypes of an asset that have instances; `None` when `keep_going` returned false.
-pub(super) fn collect(
+pub(crate) fn collect(
     source: &TriangleSource,
     number: usize,
     report: &mut BuildReport,
@@ -34,7 +34,7 @@ pub(super) fn collect(
 }
 
 /// Encodes the chunk of a prototype; its origin is the middle of its box.
-pub(super) fn encode(triangles: &[BuildTriangle], source: &TriangleSource) -> Result<ChunkFile> {
+pub(crate) fn encode(triangles: &[BuildTriangle], source: &TriangleSource) -> Result<ChunkFile> {
     let corners = || triangles.iter().flat_map(|t| t.corners);
     let middle = |k: usize| {
         let (lo, hi) = (corners().map(|c| c[k]).min().unwrap_or(0), corners().map(|c| c[k]).max().unwrap_or(0));
@@ -45,7 +45,7 @@ pub(super) fn encode(triangles: &[BuildTriangle], source: &TriangleSource) -> Re
 }
 
 /// Returns the instances of an asset's prototypes that have triangles, in the order of the asset; `prototype` is an index into `prototypes`.
-pub(super) fn instances(source: &TriangleSource, number: usize, prototypes: &Prototypes, report: &mut BuildReport) -> Vec<InstanceRecord> {
+pub(crate) fn instances(source: &TriangleSource, number: usize, prototypes: &Prototypes, report: &mut BuildReport) -> Vec<InstanceRecord> {
     let known: BTreeMap<u32, (u32, [u64; 2])> =
         prototypes.iter().zip(0..).map(|((key, t), k)| (*key, (k, content_hash(t, &source.materials.records)))).collect();
     let asset = source.assets[number];
@@ -83,9 +83,9 @@ fn instance_hash(content: &[u64; 2], object_id: u32, transform: &[f64; 12]) -> [
 }
 
 /// Returns the local box of all instances.
-pub(super) fn placed_bounds(records: &[InstanceRecord], entries: &[ChunkEntry]) -> Box3 {
+pub(crate) fn placed_bounds(records: &[InstanceRecord], entries: &[ChunkEntry]) -> Box3 {
     let boxes: Vec<Box3> = entries.iter().map(ChunkEntry::box3).collect();
     let mut out = Box3::EMPTY;
-    records.iter().for_each(|r| out.add_box(&crate::instances::placed_box(&r.transform, &boxes[r.prototype as usize])));
+    records.iter().for_each(|r| out.add_box(&map3d_scene::instances::placed_box(&r.transform, &boxes[r.prototype as usize])));
     out
 }

@@ -7,19 +7,19 @@ use map3d_base::asset::{AssetMesh, Instance, Material, Materials};
 use map3d_base::{Error, Extent, Result};
 use twox_hash::XxHash3_128;
 
-use super::BuildRequest;
-use super::asset_summary::{AssetSummary, EXTENSION};
-use super::files::prune;
+use crate::BuildRequest;
+use crate::asset_summary::{AssetSummary, EXTENSION};
+use crate::files::prune;
 
 /// Incremented when the same assets would yield other summaries or chunks.
-pub(super) const BUILD_FORMAT: u32 = 2;
+pub(crate) const BUILD_FORMAT: u32 = 2;
 const FOLDER: &str = "build";
 const OBJECTS: &str = "objects.jsonl";
 /// In the JSON of a material to which the source gives no colour.
 const SURFACE: &[u8] = b"\"surface\"";
 
 /// The assets of a request, by number.
-pub(super) struct Assets {
+pub(crate) struct Assets {
     entries: Vec<AssetEntry>,
     summaries_folder: PathBuf,
     /// Summaries of assets before they changed or were removed.
@@ -174,7 +174,7 @@ fn compute_digest(folder: &Path, request: &BuildRequest, extent: Option<&Extent>
     Ok(format!("{:032x}", hash.finish_128()))
 }
 
-pub(super) struct Asset {
+pub(crate) struct Asset {
     pub folder: PathBuf,
     pub mesh: AssetMesh,
     pub materials: Vec<Material>,

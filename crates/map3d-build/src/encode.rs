@@ -5,12 +5,12 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use bytemuck::Zeroable;
 use map3d_base::file::{self, HEADER_BYTES, aligned};
 use map3d_base::{Error, Result, Vec3};
+use map3d_scene::bvh::{self, Aabb, Tree};
+use map3d_scene::lattice::{Point, STEPS_PER_M, metres};
+use map3d_scene::records::{CHUNK_MAGIC, ChunkHeader, ChunkObject, EMPTY, FLAG_CUTOUT, FLAG_NORMALS, Leaf, MaterialRecord, TriangleRecord, VERSION};
 use twox_hash::XxHash3_128;
 
-use super::triangle::BuildTriangle;
-use crate::bvh::{self, Aabb, Tree};
-use crate::lattice::{Point, STEPS_PER_M, metres};
-use crate::records::{CHUNK_MAGIC, ChunkHeader, ChunkObject, EMPTY, FLAG_CUTOUT, FLAG_NORMALS, Leaf, MaterialRecord, TriangleRecord, VERSION};
+use crate::triangle::BuildTriangle;
 
 /// The bytes of a chunk file and its values in the scene index.
 #[derive(Clone, Debug)]
@@ -136,7 +136,7 @@ impl Objects {
 }
 
 /// Hashes everything visible of the triangles; independent of chunk and file.
-pub(super) fn content_hash(triangles: &[BuildTriangle], materials: &[MaterialRecord]) -> [u64; 2] {
+pub(crate) fn content_hash(triangles: &[BuildTriangle], materials: &[MaterialRecord]) -> [u64; 2] {
     let mut hash = XxHash3_128::with_seed(0);
     for t in triangles {
         hash.write(bytemuck::bytes_of(&t.corners));

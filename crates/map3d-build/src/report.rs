@@ -39,7 +39,7 @@ pub struct BuildReport {
 
 impl BuildReport {
     /// Adds the counts of an asset.
-    pub(super) fn add(&mut self, asset: &Self) {
+    pub(crate) fn add(&mut self, asset: &Self) {
         self.triangles_read += asset.triangles_read;
         self.degenerate_triangles += asset.degenerate_triangles;
         self.duplicate_faces += asset.duplicate_faces;

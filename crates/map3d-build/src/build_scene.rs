@@ -4,25 +4,25 @@ use std::collections::HashSet;
 use std::path::Path;
 
 use map3d_base::{Box3, Error, Extent, Result, vec3};
+use map3d_scene::index::{Cell, ChunkEntry, FILE, InstancesEntry, SceneIndex};
+use map3d_scene::instances;
+use map3d_scene::lattice::{MAX_EDGE_M, metres};
+use map3d_scene::records::InstanceRecord;
 use map3d_texture::{TextureKeys, prune_textures};
 
-use super::asset_summary::{AssetSummary, CellSum, CellSums, record_hash};
-use super::assets::{Asset, Assets, BUILD_FORMAT};
-use super::cells::{PinnedSquare, Quadtree};
-use super::chunk_cache::{CHUNKS, read_cached_chunk};
-use super::chunks::{CellChunks, CellContent, ChunkWriter};
-use super::files::{prune, write_if_changed};
-use super::ground::GroundLevel;
-use super::materials::BuildMaterials;
-use super::summarize::summarize_asset;
-use super::triangle::BuildTriangle;
-use super::triangle_source::TriangleSource;
-use super::{BuildReport, BuildRequest, GroundPlane, Progress, prototypes, textures};
+use crate::asset_summary::{AssetSummary, CellSum, CellSums, record_hash};
+use crate::assets::{Asset, Assets, BUILD_FORMAT};
+use crate::cells::{PinnedSquare, Quadtree};
+use crate::chunk_cache::{CHUNKS, read_cached_chunk};
+use crate::chunks::{CellChunks, CellContent, ChunkWriter};
 use crate::content::Content;
-use crate::index::{Cell, ChunkEntry, FILE, InstancesEntry, SceneIndex};
-use crate::instances;
-use crate::lattice::{MAX_EDGE_M, metres};
-use crate::records::InstanceRecord;
+use crate::files::{prune, write_if_changed};
+use crate::ground::GroundLevel;
+use crate::materials::BuildMaterials;
+use crate::summarize::summarize_asset;
+use crate::triangle::BuildTriangle;
+use crate::triangle_source::TriangleSource;
+use crate::{BuildReport, BuildRequest, GroundPlane, Progress, prototypes, textures};
 
 const INSTANCES_FILE: &str = "instances.m3i";
 /// Triangles that result from splitting long edges, at most.
@@ -206,7 +206,7 @@ impl Build<'_> {
         self.assets.close_all();
         written.iter().for_each(|w| add_counts(&mut self.report, w));
         let mut entries: Vec<ChunkEntry> = written.into_iter().flat_map(|w| w.entries).collect();
-        entries.sort_by_key(|e: &ChunkEntry| (e.cell.map(super::cells::morton_key), e.file.clone()));
+        entries.sort_by_key(|e: &ChunkEntry| (e.cell.map(crate::cells::morton_key), e.file.clone()));
         let cells: Vec<Cell> = entries.iter().filter_map(|e| e.cell).collect();
         Ok((entries, tree.pin(&cells)))
     }

@@ -57,7 +57,7 @@ struct Look {
 
 /// The looks of an asset's objects. Look 0 is that of prototypes, which many objects share.
 #[derive(Default)]
-pub(super) struct Looks {
+pub(crate) struct Looks {
     looks: Vec<Look>,
     by_object: Vec<u32>,
 }

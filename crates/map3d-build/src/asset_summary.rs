@@ -6,22 +6,22 @@ use std::path::Path;
 use bytemuck::{Pod, Zeroable};
 use map3d_base::file::{self, HEADER_BYTES, aligned, header_start};
 use map3d_base::{Error, Result};
+use map3d_scene::records::{InstanceRecord, MaterialRecord};
 use map3d_texture::{TextureInfo, TextureSource};
 use serde::{Deserialize, Serialize};
 use twox_hash::{XxHash3_64, XxHash3_128};
 
-use super::BuildReport;
-use super::ground::GroundLevel;
-use super::triangle::BuildTriangle;
-use crate::records::{InstanceRecord, MaterialRecord};
+use crate::BuildReport;
+use crate::ground::GroundLevel;
+use crate::triangle::BuildTriangle;
 
-pub(super) const EXTENSION: &str = "m3v";
+pub(crate) const EXTENSION: &str = "m3v";
 const MAGIC: &[u8; 4] = b"M3DV";
 const VERSION: u32 = 1;
 
 /// Summary of one asset. Follows from the asset, the request and the keys of its textures; `cells` also from the square.
 #[derive(Clone, Debug, Default)]
-pub(super) struct AssetSummary {
+pub(crate) struct AssetSummary {
     pub details: AssetDetails,
     /// In the order of cells.
     pub cells: Vec<CellSum>,
@@ -32,7 +32,7 @@ pub(super) struct AssetSummary {
 }
 
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct AssetDetails {
+pub(crate) struct AssetDetails {
     /// Digest of the input of the summary; the file calls it `mark`.
     #[serde(rename = "mark")]
     pub digest: String,
@@ -54,7 +54,7 @@ pub(super) struct AssetDetails {
 
 /// A texture that triangles use; without a key its image is missing or broken.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(super) struct SummaryTexture {
+pub(crate) struct SummaryTexture {
     pub texture: Option<String>,
     pub alpha: Option<String>,
     pub key: Option<[u8; 16]>,
@@ -81,7 +81,7 @@ impl SummaryTexture {
 /// Triangles of an asset in a cell of the counting level, and the sum of their hashes modulo 2^128, which does not depend on their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct CellSum {
+pub(crate) struct CellSum {
     pub cell: u32,
     pub count: u32,
     pub sum: [u64; 2],
@@ -95,7 +95,7 @@ impl CellSum {
 
 /// Collects the sums of cells.
 #[derive(Default)]
-pub(super) struct CellSums(HashMap<u32, (u32, u128)>);
+pub(crate) struct CellSums(HashMap<u32, (u32, u128)>);
 
 impl CellSums {
     pub fn add(&mut self, cell: u32, t: &BuildTriangle, material: u64) {
@@ -111,11 +111,11 @@ impl CellSums {
     }
 }
 
-pub(super) fn halves(v: u128) -> [u64; 2] {
+pub(crate) fn halves(v: u128) -> [u64; 2] {
     [v as u64, (v >> 64) as u64]
 }
 
-pub(super) fn record_hash(record: &MaterialRecord) -> u64 {
+pub(crate) fn record_hash(record: &MaterialRecord) -> u64 {
     XxHash3_64::oneshot(bytemuck::bytes_of(record))
 }
 

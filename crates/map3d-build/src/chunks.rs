@@ -4,22 +4,22 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
 
 use map3d_base::{Error, Result};
+use map3d_scene::index::{Cell, ChunkEntry};
+use map3d_scene::lattice::snap;
+use map3d_scene::records::MaterialRecord;
 use rayon::prelude::*;
 use twox_hash::XxHash3_128;
 
-use super::asset_summary::halves;
-use super::buckets::TriangleBuckets;
-use super::cells::{CELL_TRIANGLES, Quadtree, slab, slab_center};
-use super::chunk_cache::{CHUNKS, CachedChunk, ChunkCache};
-use super::encode::{ChunkInput, encode_chunk};
-use super::files::write_if_changed;
-use super::triangle::BuildTriangle;
-use super::triangle_source::TriangleSource;
-use super::unpack::{MaterialNumbers, unpack_chunk};
-use super::{BuildReport, BuildRequest, Progress};
-use crate::index::{Cell, ChunkEntry};
-use crate::lattice::snap;
-use crate::records::MaterialRecord;
+use crate::asset_summary::halves;
+use crate::buckets::TriangleBuckets;
+use crate::cells::{CELL_TRIANGLES, Quadtree, slab, slab_center};
+use crate::chunk_cache::{CHUNKS, CachedChunk, ChunkCache};
+use crate::encode::{ChunkInput, encode_chunk};
+use crate::files::write_if_changed;
+use crate::triangle::BuildTriangle;
+use crate::triangle_source::TriangleSource;
+use crate::unpack::{MaterialNumbers, unpack_chunk};
+use crate::{BuildReport, BuildRequest, Progress};
 
 /// Upper bound of the memory that encoding one cell takes.
 const CELL_MEMORY_BYTES: u64 = 160 << 20;
@@ -33,7 +33,7 @@ const SPILL: &str = "spill";
 
 /// The content of a sorting cell.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct CellContent {
+pub(crate) struct CellContent {
     triangles: u64,
     /// Sum of the triangles' hashes modulo 2^128.
     sum: u128,
@@ -70,14 +70,14 @@ enum CellPlan {
 
 /// The chunks of a sorting cell.
 #[derive(Default)]
-pub(super) struct CellChunks {
+pub(crate) struct CellChunks {
     pub entries: Vec<ChunkEntry>,
     pub kept: u64,
     pub duplicate_faces: u64,
 }
 
 /// Builds the cells whose chunks the cache does not have.
-pub(super) struct ChunkWriter<'a> {
+pub(crate) struct ChunkWriter<'a> {
     folder: &'a Path,
     request: &'a BuildRequest,
     tree: &'a Quadtree,

@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 
 use map3d_base::Box3;
 use map3d_base::tile::morton;
+use map3d_scene::index::Cell;
 
-use super::triangle::BuildTriangle;
-use crate::index::Cell;
+use crate::triangle::BuildTriangle;
 
-pub(super) const CELL_TRIANGLES: u64 = 262_144;
+pub(crate) const CELL_TRIANGLES: u64 = 262_144;
 /// A cell's triangles must lie within float32's exact reach of its centre.
 const MAX_SIDE_M: f64 = 4096.0;
 /// Height of the slabs that a cell is cut into, for the same reason; slab 0 is centred on the local origin.
@@ -21,7 +21,7 @@ const MAX_LEVEL: u32 = 24;
 
 /// x0, y0 and side in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct PinnedSquare(pub [f64; 3]);
+pub(crate) struct PinnedSquare(pub [f64; 3]);
 
 impl PinnedSquare {
     /// Returns the square of a new scene: a corner in whole metres, a power of two as side, and a margin.
@@ -83,7 +83,7 @@ impl PinnedSquare {
 }
 
 /// Counts triangles per cell of `COUNT_LEVEL` and assigns these cells to sorting cells.
-pub(super) struct Quadtree {
+pub(crate) struct Quadtree {
     pub square: PinnedSquare,
     counts: Vec<u64>,
     pinned: BTreeSet<Cell>,
@@ -208,7 +208,7 @@ impl Quadtree {
 }
 
 /// Returns a key that sorts cells of all levels in Morton order of their first corner, larger cells first.
-pub(super) fn morton_key([level, x, y]: Cell) -> (u64, u32) {
+pub(crate) fn morton_key([level, x, y]: Cell) -> (u64, u32) {
     let shift = MAX_LEVEL - level;
     (morton(x << shift, y << shift), level)
 }
@@ -219,12 +219,12 @@ fn children([level, x, y]: Cell) -> [Cell; 4] {
 }
 
 /// Returns the slab of a triangle's height; most scenes have only slab 0.
-pub(super) fn slab(t: &BuildTriangle) -> i64 {
+pub(crate) fn slab(t: &BuildTriangle) -> i64 {
     (t.centroid_m()[2] / SLAB_M + 0.5).floor() as i64
 }
 
 /// Returns the local height of a slab's middle.
-pub(super) fn slab_center(slab: i64) -> f64 {
+pub(crate) fn slab_center(slab: i64) -> f64 {
     slab as f64 * SLAB_M
 }
 
@@ -234,7 +234,7 @@ mod tests {
     use bytemuck::Zeroable;
 
     fn at(x: f64, y: f64) -> BuildTriangle {
-        let p = crate::lattice::snap([x, y, 0.0]);
+        let p = map3d_scene::lattice::snap([x, y, 0.0]);
         BuildTriangle { corners: [p, [p[0] + 6, p[1], 0], [p[0], p[1] + 6, 0]], ..BuildTriangle::zeroed() }
     }
 

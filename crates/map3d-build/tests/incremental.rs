@@ -5,9 +5,9 @@ use std::path::Path;
 
 use crate::fixture::{Face, Folder, batch, bytes_of, new_folder, request, run, tent, write_asset};
 use map3d_base::asset::{Instance, Material, Materials, Rank};
+use map3d_build::{BuildRequest, build_scene};
 use map3d_image::encode::{Deflate, Filter, encode_png};
 use map3d_scene::SceneStore;
-use map3d_scene::builder::{BuildRequest, build_scene};
 
 /// Returns a quarter of a grid of tents over 20 × 20 km; cells at its borders also have tents of other quarters.
 fn quarter(number: u32) -> Vec<Face> {
