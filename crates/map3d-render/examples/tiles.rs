@@ -5,8 +5,8 @@
 
 use std::path::PathBuf;
 
-use map3d_base::tile::Tile;
 use map3d_base::layers::{LAYERS, LayerRow};
+use map3d_base::tile::Tile;
 use map3d_base::{Box3, Frame, LayerFormat, LayerSpec, Vec3};
 use map3d_image::GBuffer;
 use map3d_image::encode::Encoder;
@@ -178,7 +178,8 @@ fn round(scene: &RenderScene, f: &Frame, tiles: &[Tile], save: Option<PathBuf>) 
             siblings.clear();
         }
     }
-    (out.visibility_s, out.shade_s, out.light_s) = (renderer.visibility_s, renderer.shade_s, renderer.light_s);
+    let times = renderer.times();
+    (out.visibility_s, out.shade_s, out.light_s) = (times.visibility_s, times.shade_s, times.light_s);
     (out.shades, out.setups) = renderer.shade_counts();
     out
 }

@@ -1,7 +1,7 @@
 //! Blocks: the unit of a job. Tiles are rendered in Morton order and reduced as soon as four siblings are complete, so that memory holds only a few tiles
 //! per level.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 
 use map3d_base::tile::{Tile, block_levels};
 use map3d_base::{Error, Frame, Result};
@@ -11,6 +11,7 @@ use map3d_image::{Arrays, GBuffer, reduce};
 
 use crate::clock::CpuClock;
 use crate::scene::RenderScene;
+use crate::subtile::StageTimes;
 use crate::tile::TileRenderer;
 
 /// One layer of one tile, encoded.
@@ -63,9 +64,9 @@ impl RenderScene {
         let mut source = RenderedTiles { renderer: TileRenderer::new(self, frame)?, zmax: frame.zmax, count: 0 };
         let mut block = build_block(frame, root, &mut source)?;
         let RenderedTiles { renderer, count, .. } = source;
-        (block.stats.visibility_s, block.stats.shade_s, block.stats.traced_tiles) = (renderer.visibility_s, renderer.shade_s, count);
-        block.stats.light_s = renderer.light_s;
-        (block.stats.shades, block.stats.setups) = renderer.shade_counts();
+        let StageTimes { visibility_s, shade_s, light_s } = renderer.times();
+        let (shades, setups) = renderer.shade_counts();
+        block.stats = BlockStats { visibility_s, shade_s, light_s, traced_tiles: count, shades, setups, ..block.stats };
         Ok(block)
     }
 }
@@ -95,8 +96,9 @@ fn check_tile(tile: Tile) -> Result<()> {
     }
 }
 
-fn build_block(frame: &Frame, root: Tile, source: &mut impl TileSource) -> Result<Block> {
-    let mut builder = BlockBuilder { frame, encoder: Encoder::new(), block: Block::default() };
+/// Builds a block from its deepest tiles: reduces and encodes them, and writes the seam. The bytes depend on nothing but the frame and the tiles.
+pub fn build_block(frame: &Frame, root: Tile, source: &mut dyn TileSource) -> Result<Block> {
+    let mut builder = BlockBuilder { frame, encoder: Encoder::new(), block: Block::default(), fetched: VecDeque::new() };
     let seam = builder.build_tile(root, source)?;
     let mut clock = CpuClock::start();
     builder.block.seam = seam.map(|g| write_seam(&g));
@@ -104,12 +106,20 @@ fn build_block(frame: &Frame, root: Tile, source: &mut impl TileSource) -> Resul
     Ok(builder.block)
 }
 
-/// The source of a block's deepest tiles.
-trait TileSource {
+/// The source of a block's deepest tiles. A back end of the tracer is a source; reduction, encoding and seams are above it, the same for all.
+pub trait TileSource {
     /// The level of the tiles that the source yields.
     fn level(&self) -> u8;
-    /// Returns `None` for an empty tile.
-    fn tile(&mut self, tile: Tile) -> Result<Option<GBuffer>>;
+
+    /// Returns the G-buffers of tiles of that level, in their order; `None` for an empty tile.
+    fn tiles(&mut self, tiles: &[Tile]) -> Result<Vec<Option<GBuffer>>>;
+
+    /// The number of levels under a tile whose tiles are asked for in one call: 4 siblings for 1, 64 tiles for 3, in Morton order. All of them are in memory
+    /// until they are reduced; siblings are so in any case.
+    fn levels_at_once(&self) -> u8 {
+        1
+    }
+
     /// Whether the source's tiles are part of the block; otherwise they belong to the blocks below.
     fn is_in_block(&self) -> bool;
 }
@@ -118,14 +128,24 @@ struct BlockBuilder<'a> {
     frame: &'a Frame,
     encoder: Encoder,
     block: Block,
+    /// The source's next tiles.
+    fetched: VecDeque<Option<GBuffer>>,
 }
 
 impl BlockBuilder<'_> {
     /// Returns the G-buffer of a tile and encodes it if it is part of the block. Tiles above the source are reduced from their children, in Morton order.
-    fn build_tile(&mut self, tile: Tile, source: &mut impl TileSource) -> Result<Option<GBuffer>> {
+    fn build_tile(&mut self, tile: Tile, source: &mut dyn TileSource) -> Result<Option<GBuffer>> {
+        // The tiles of the deepest level under this one.
+        let depth = source.level() - tile.z;
+        if depth <= source.levels_at_once() && self.fetched.is_empty() {
+            let asked = descendants(tile, depth);
+            self.fetched = source.tiles(&asked)?.into();
+            assert_eq!(self.fetched.len(), asked.len(), "a source answers for each tile");
+        }
+
         // The deepest level.
-        if tile.z == source.level() {
-            let g = source.tile(tile)?;
+        if depth == 0 {
+            let g = self.fetched.pop_front().expect("fetched above");
             if let Some(g) = g.as_ref().filter(|_| source.is_in_block()) {
                 self.encode(tile, g)?;
             }
@@ -161,6 +181,11 @@ impl BlockBuilder<'_> {
     }
 }
 
+/// Returns the tiles a number of levels under a tile, in Morton order.
+fn descendants(tile: Tile, levels: u8) -> Vec<Tile> {
+    (0..levels).fold(vec![tile], |above, _| above.into_iter().flat_map(Tile::children).collect())
+}
+
 /// Base tiles, rendered.
 struct RenderedTiles<'s> {
     renderer: TileRenderer<'s>,
@@ -174,10 +199,10 @@ impl TileSource for RenderedTiles<'_> {
         self.zmax
     }
 
-    fn tile(&mut self, tile: Tile) -> Result<Option<GBuffer>> {
-        let g = self.renderer.tile(tile.x, tile.y)?;
-        self.count += u64::from(g.is_some());
-        Ok(g)
+    fn tiles(&mut self, tiles: &[Tile]) -> Result<Vec<Option<GBuffer>>> {
+        let all: Vec<_> = tiles.iter().map(|tile| self.renderer.tile(tile.x, tile.y)).collect::<Result<_>>()?;
+        self.count += all.iter().flatten().count() as u64;
+        Ok(all)
     }
 
     fn is_in_block(&self) -> bool {
@@ -193,12 +218,8 @@ struct SeamTiles<'a> {
     arrays: Arrays,
 }
 
-impl TileSource for SeamTiles<'_> {
-    fn level(&self) -> u8 {
-        self.level
-    }
-
-    fn tile(&mut self, tile: Tile) -> Result<Option<GBuffer>> {
+impl SeamTiles<'_> {
+    fn tile(&self, tile: &Tile) -> Result<Option<GBuffer>> {
         let Some(bytes) = self.by_tile.get(&(tile.x, tile.y)) else { return Ok(None) };
         let name = format!("seam {}/{}/{}", tile.z, tile.x, tile.y);
         let g = read_seam(&name, bytes)?;
@@ -207,6 +228,16 @@ impl TileSource for SeamTiles<'_> {
             true if g.arrays() != self.arrays => Err(Error::format(name, "arrays do not match the frame's layers")),
             true => Ok(Some(g)),
         }
+    }
+}
+
+impl TileSource for SeamTiles<'_> {
+    fn level(&self) -> u8 {
+        self.level
+    }
+
+    fn tiles(&mut self, tiles: &[Tile]) -> Result<Vec<Option<GBuffer>>> {
+        tiles.iter().map(|tile| self.tile(tile)).collect()
     }
 
     fn is_in_block(&self) -> bool {

@@ -11,13 +11,15 @@ mod material;
 mod query;
 mod scene;
 mod shade;
+mod subtile;
 mod surface_order;
 mod tile;
 mod view;
 
-pub use block::{Block, BlockStats, EncodedTile, reduce_block};
+pub use block::{Block, BlockStats, EncodedTile, TileSource, build_block, reduce_block};
 pub use cutout::TextureCutout;
 pub use query::Pick;
 pub use scene::{RenderScene, SceneStats};
+pub use subtile::StageTimes;
 pub use tile::TileRenderer;
 pub use view::{HitSelection, RayHit, Region, ViewImage, ViewPixels, ViewRequest, ViewTimes};

@@ -86,20 +86,11 @@ impl SubtileTarget<'_> {
 
 impl Shader {
     /// `keeps_fragments`: the caller needs `fragments`.
-    pub fn new(isa: Isa, keeps_fragments: bool) -> Self {
-        Self::with_materials(MaterialCache::new(isa), keeps_fragments, SampleSet::ALL)
-    }
-
-    /// Shades sub-tiles of any view.
-    pub fn of_view(isa: Isa, view: &Projection, keeps_fragments: bool, samples: SampleSet) -> Self {
+    pub fn new(isa: Isa, view: &Projection, keeps_fragments: bool, samples: SampleSet) -> Self {
         let materials = match view {
             Projection::Parallel(_) => MaterialCache::new(isa),
             Projection::Perspective(_) => MaterialCache::in_perspective(isa),
         };
-        Self::with_materials(materials, keeps_fragments, samples)
-    }
-
-    fn with_materials(materials: MaterialCache, keeps_fragments: bool, samples: SampleSet) -> Self {
         Self {
             samples,
             materials,

@@ -1,31 +1,18 @@
-//! One base tile: sub-tiles traced and shaded into a G-buffer.
+//! One base tile: its sub-tiles, rendered into a G-buffer.
 
-use map3d_base::{Error, Frame, Isa, LayerKind, Projection, Result};
+use map3d_base::{Error, Frame, Isa, Projection, Result};
 use map3d_image::{Arrays, GBuffer};
-use map3d_trace::{BeamTracer, SUBTILE_PX};
+use map3d_trace::SUBTILE_PX;
 
-use crate::clock::CpuClock;
-use crate::cutout::TextureCutout;
-use crate::light::{LightTracer, SubtilePosition};
+use crate::light::SubtilePosition;
 use crate::scene::RenderScene;
-use crate::shade::Shader;
+use crate::shade::SampleSet;
+use crate::subtile::{StageTimes, SubtileRenderer};
 
 /// Renders base tiles of one view. Keep one per thread to reuse its buffers.
 pub struct TileRenderer<'s> {
-    scene: &'s RenderScene,
     frame: Frame,
-    tracer: BeamTracer<'s>,
-    cutout: TextureCutout<'s>,
-    shader: Shader,
-    light: Option<LightTracer<'s>>,
-    /// Arrays of the tiles that the renderer returns.
-    output: Arrays,
-    /// `output` and the arrays that only computing needs.
-    working: Arrays,
-    /// Seconds of the thread's CPU time.
-    pub visibility_s: f64,
-    pub shade_s: f64,
-    pub light_s: f64,
+    subtiles: SubtileRenderer<'s>,
 }
 
 impl<'s> TileRenderer<'s> {
@@ -37,27 +24,17 @@ impl<'s> TileRenderer<'s> {
     /// Uses another instruction set than the best; the results are the same.
     pub fn with_isa(scene: &'s RenderScene, frame: &Frame, isa: Isa) -> Result<Self> {
         frame.validate()?;
-        let output = Arrays::of(&frame.layers);
-        let light = LightTracer::new(scene.store(), &frame.layers, Projection::of_frame(frame), isa);
-        let has_picture = output.has(LayerKind::Picture);
-        Ok(Self {
-            scene,
-            frame: frame.clone(),
-            tracer: BeamTracer::with_isa(scene.store(), frame, isa)?,
-            cutout: TextureCutout::new(scene.textures()),
-            shader: Shader::new(isa, light.is_some()),
-            light,
-            output,
-            working: if has_picture { output.and(LayerKind::Color) } else { output },
-            visibility_s: 0.0,
-            shade_s: 0.0,
-            light_s: 0.0,
-        })
+        let subtiles = SubtileRenderer::new(scene, Projection::of_frame(frame), None, &frame.layers, SampleSet::ALL, isa)?;
+        Ok(Self { frame: frame.clone(), subtiles })
+    }
+
+    pub fn times(&self) -> StageTimes {
+        self.subtiles.times()
     }
 
     /// Returns the numbers of shaded (pixel, surface) pairs and of prepared surfaces so far.
     pub fn shade_counts(&self) -> (u64, u64) {
-        (self.shader.shades, self.shader.setups)
+        self.subtiles.shade_counts()
     }
 
     /// Returns the G-buffer of base tile (x, y), or `None` for an empty tile.
@@ -71,31 +48,13 @@ impl<'s> TileRenderer<'s> {
         for number in 0..(side / SUBTILE_PX).pow(2) {
             let (left, top) = (number % (side / SUBTILE_PX) * SUBTILE_PX, number / (side / SUBTILE_PX) * SUBTILE_PX);
             let in_view = [(x, left), (y, top)].map(|(t, offset)| u64::from(t) * side as u64 + offset as u64);
-            self.render_subtile(SubtilePosition { in_tile: (left, top), in_view }, &mut g)?;
+            self.subtiles.render(SubtilePosition { in_tile: (left, top), in_view }, self.frame.tile_px, &mut g)?;
         }
-        self.scene.check_textures(&self.cutout)?;
-        Ok(g.map(|mut g: GBuffer| {
-            g.keep(self.output);
-            g
-        }))
-    }
-
-    /// Traces, shades and lights a sub-tile; the first one with content creates the G-buffer.
-    fn render_subtile(&mut self, position: SubtilePosition, g: &mut Option<GBuffer>) -> Result<()> {
-        let mut clock = CpuClock::start();
-        let [x_px, y_px] = position.in_view;
-        let vis = self.tracer.trace(x_px, y_px, &self.cutout)?;
-        self.visibility_s += clock.lap_s();
-        if !vis.is_empty() {
-            let g = g.get_or_insert_with(|| GBuffer::with(self.frame.tile_px, self.frame.tile_px, self.working));
-            self.shader.shade_subtile(vis, self.scene.textures(), g, position.in_tile)?;
-            self.shade_s += clock.lap_s();
-            if let Some(light) = &mut self.light {
-                light.trace_subtile(vis, &self.shader, g, position, &self.cutout)?;
-                self.light_s += clock.lap_s();
-            }
+        self.subtiles.check_textures()?;
+        if let Some(g) = &mut g {
+            g.keep(Arrays::of(&self.frame.layers));
         }
-        Ok(())
+        Ok(g)
     }
 }
 

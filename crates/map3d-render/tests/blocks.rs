@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use crate::town::{TempFolder, Town, all_layers, bricks, frame, new_folder};
 use map3d_base::asset::Wrap;
-use map3d_base::tile::Tile;
 use map3d_base::layers::{COLOR, DEPTH, ID, NORMAL};
-use map3d_base::{Frame, LayerFormat, LayerKind};
+use map3d_base::tile::Tile;
+use map3d_base::{Frame, LayerFormat, LayerKind, Result};
 use map3d_image::GBuffer;
 use map3d_image::encode::{bytes_from_u32, decode_png};
 use map3d_image::seam::read_seam;
-use map3d_render::{Block, RenderScene, TileRenderer, reduce_block};
+use map3d_render::{Block, RenderScene, TileRenderer, TileSource, build_block, reduce_block};
 
 fn scene(name: &str) -> (TempFolder, RenderScene) {
     let mut town = Town::default();
@@ -91,6 +91,45 @@ fn block_has_its_tiles_in_all_layers_and_a_seam() {
     assert!(tiles.contains_key(&ROOT));
     let seam = read_seam("root", block.seam.as_deref().expect("has content")).expect("sound");
     assert_eq!(decode_png(tile_of(&block, 3, ROOT).expect("root")).expect("sound").pixels, bytes_from_u32(&seam[DEPTH]));
+}
+
+/// A back end that wants the tiles of several levels in one call.
+struct OtherBackEnd<'s> {
+    renderer: TileRenderer<'s>,
+    levels: u8,
+    calls: Vec<usize>,
+}
+
+impl TileSource for OtherBackEnd<'_> {
+    fn level(&self) -> u8 {
+        2
+    }
+
+    fn tiles(&mut self, tiles: &[Tile]) -> Result<Vec<Option<GBuffer>>> {
+        self.calls.push(tiles.len());
+        tiles.iter().map(|tile| self.renderer.tile(tile.x, tile.y)).collect()
+    }
+
+    fn levels_at_once(&self) -> u8 {
+        self.levels
+    }
+
+    fn is_in_block(&self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn bytes_do_not_depend_on_how_many_tiles_are_asked_for_at_once() {
+    let (_folder, scene) = scene("at-once");
+    let f = frame(0.0, 45.0, 160.0, 2);
+    let expected = scene.render_block(&f, ROOT).expect("renders");
+    for (levels, calls) in [(0, vec![1; 16]), (1, vec![4; 4]), (2, vec![16]), (5, vec![16])] {
+        let mut source = OtherBackEnd { renderer: TileRenderer::new(&scene, &f).expect("a frame"), levels, calls: Vec::new() };
+        let block = build_block(&f, ROOT, &mut source).expect("builds");
+        assert_eq!((block.tiles, block.seam), (expected.tiles.clone(), expected.seam.clone()), "{levels} levels");
+        assert_eq!(source.calls, calls);
+    }
 }
 
 /// A reduce block of four base blocks gives the same root as reducing their seams directly.

@@ -5,18 +5,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use map3d_base::{Error, Isa, LayerKind, Result};
-use map3d_image::{Arrays, GBuffer};
-use map3d_trace::{BeamTracer, SUBTILE_PX};
+use map3d_base::{Error, Isa, Result};
+use map3d_image::Arrays;
+use map3d_trace::SUBTILE_PX;
 
 use super::image::{TileRows, ViewImage};
 use super::request::{Region, SceneCamera, ViewRequest};
 use super::times::ViewTimes;
 use crate::clock::CpuClock;
-use crate::cutout::TextureCutout;
-use crate::light::{LightTracer, SubtilePosition};
+use crate::light::SubtilePosition;
 use crate::scene::RenderScene;
-use crate::shade::Shader;
+use crate::subtile::{StageTimes, SubtileRenderer};
 
 const SIDE: u32 = SUBTILE_PX as u32;
 
@@ -81,7 +80,7 @@ impl SharedView<'_> {
     fn render_tiles(&self, must_continue: &mut dyn FnMut() -> bool) -> Result<()> {
         let mut renderer = ImageTileRenderer::new(self)?;
         let done = self.render_tiles_with(&mut renderer, must_continue);
-        self.scene.add_view_times(&renderer.times);
+        self.scene.add_view_times(&renderer.times());
         done
     }
 
@@ -144,51 +143,32 @@ impl SharedView<'_> {
 
 /// Renders the image tiles of one thread.
 struct ImageTileRenderer<'s> {
-    scene: &'s RenderScene,
-    tracer: BeamTracer<'s>,
-    cutout: TextureCutout<'s>,
-    shader: Shader,
-    light: Option<LightTracer<'s>>,
-    arrays: Arrays,
-    times: ViewTimes,
+    subtiles: SubtileRenderer<'s>,
+    convert_s: f64,
 }
 
 impl<'s> ImageTileRenderer<'s> {
     fn new(shared: &SharedView<'s>) -> Result<Self> {
         let SharedView { scene, request, isa, camera, .. } = shared;
-        let light = LightTracer::new(scene.store(), &request.layers, camera.view, *isa);
-        let arrays = Arrays::of(&request.layers);
-        Ok(Self {
-            scene,
-            tracer: BeamTracer::of_view(scene.store(), camera.view, Some(camera.clip.clone()), *isa)?,
-            cutout: TextureCutout::new(scene.textures()),
-            shader: Shader::of_view(*isa, &camera.view, light.is_some(), request.sample_set()?),
-            light,
-            arrays: if arrays.has(LayerKind::Picture) { arrays.and(LayerKind::Color) } else { arrays },
-            times: ViewTimes::default(),
-        })
+        let subtiles = SubtileRenderer::new(scene, camera.view, Some(camera.clip.clone()), &request.layers, request.sample_set()?, *isa)?;
+        Ok(Self { subtiles, convert_s: 0.0 })
     }
 
-    /// Traces, shades and lights an image tile, and copies it into the image.
+    /// Renders an image tile and copies it into the image.
     fn render(&mut self, shared: &SharedView, number: usize) -> Result<()> {
-        let mut clock = CpuClock::start();
         let corner = shared.tile_corner(number);
-        let vis = self.tracer.trace(u64::from(corner[0]), u64::from(corner[1]), &self.cutout)?;
-        self.times.visibility_s += clock.lap_s();
-        if vis.is_empty() {
-            return Ok(());
-        }
-        let mut g = GBuffer::with(SIDE, SIDE, self.arrays);
-        self.shader.shade_subtile(vis, self.scene.textures(), &mut g, (0, 0))?;
-        self.times.shade_s += clock.lap_s();
-        if let Some(light) = &mut self.light {
-            let position = SubtilePosition { in_tile: (0, 0), in_view: corner.map(u64::from) };
-            light.trace_subtile(vis, &self.shader, &mut g, position, &self.cutout)?;
-            self.times.light_s += clock.lap_s();
-        }
-        self.scene.check_textures(&self.cutout)?;
+        let mut g = None;
+        self.subtiles.render(SubtilePosition { in_tile: (0, 0), in_view: corner.map(u64::from) }, SIDE, &mut g)?;
+        let Some(g) = g else { return Ok(()) };
+        self.subtiles.check_textures()?;
+        let mut clock = CpuClock::start();
         shared.lock_image().put(&g, shared.rows_of(corner), |units| shared.camera.depth_m(units));
-        self.times.convert_s += clock.lap_s();
+        self.convert_s += clock.lap_s();
         Ok(())
+    }
+
+    fn times(&self) -> ViewTimes {
+        let StageTimes { visibility_s, shade_s, light_s } = self.subtiles.times();
+        ViewTimes { visibility_s, shade_s, light_s, convert_s: self.convert_s }
     }
 }
