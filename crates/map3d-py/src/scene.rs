@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use map3d_base::Vec3;
-use map3d_render::{HitSelection, RenderScene, ViewRequest};
+use map3d_render::{CPU, HitSelection, RenderScene, ViewRequest};
 use numpy::{PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -79,16 +79,19 @@ impl Scene {
         Ok(PyArray1::from_vec(py, py.detach(find).map_err(to_python)?))
     }
 
-    /// Returns the keys of the blocks of level z at (n, 2) columns and rows: hex hashes over everything that a base block's bytes depend on.
-    fn block_keys(&self, py: Python<'_>, frame: &Bound<'_, Frame>, z: u8, blocks: PyReadonlyArray2<u32>) -> PyResult<Vec<String>> {
+    /// Returns the keys of the blocks of level z at (n, 2) columns and rows: hex hashes over everything that a base block's bytes depend on. `device`: class
+    /// of devices that render.
+    #[pyo3(signature = (frame, z, blocks, device=CPU))]
+    fn block_keys(&self, py: Python<'_>, frame: &Bound<'_, Frame>, z: u8, blocks: PyReadonlyArray2<u32>, device: &str) -> PyResult<Vec<String>> {
         let (frame, blocks) = (&frame.get().0, blocks_of(&blocks)?);
-        py.detach(|| self.0.block_keys(frame, z, &blocks)).map_err(to_python)
+        py.detach(|| self.0.block_keys(frame, device, z, &blocks)).map_err(to_python)
     }
 
     /// Returns the key of the block at (z, x, y).
-    fn block_key(&self, py: Python<'_>, frame: &Bound<'_, Frame>, z: u8, x: u32, y: u32) -> PyResult<String> {
+    #[pyo3(signature = (frame, z, x, y, device=CPU))]
+    fn block_key(&self, py: Python<'_>, frame: &Bound<'_, Frame>, z: u8, x: u32, y: u32, device: &str) -> PyResult<String> {
         let frame = &frame.get().0;
-        py.detach(|| self.0.block_keys(frame, z, &[[x, y]])).map(|keys| keys.concat()).map_err(to_python)
+        py.detach(|| self.0.block_keys(frame, device, z, &[[x, y]])).map(|keys| keys.concat()).map_err(to_python)
     }
 
     /// Renders the base block rooted at (z, x, y).

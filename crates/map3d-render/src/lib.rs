@@ -18,6 +18,7 @@ mod view;
 
 pub use block::{Block, BlockStats, EncodedTile, TileSource, build_block, reduce_block};
 pub use cutout::TextureCutout;
+pub use map3d_trace::CPU;
 pub use query::Pick;
 pub use scene::{RenderScene, SceneStats};
 pub use subtile::StageTimes;

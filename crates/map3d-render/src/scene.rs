@@ -62,8 +62,8 @@ impl RenderScene {
     }
 
     /// Returns the keys of the blocks of a level at (x, y) each.
-    pub fn block_keys(&self, frame: &Frame, level: u8, blocks: &[[u32; 2]]) -> Result<Vec<String>> {
-        map3d_trace::block_keys(&self.store, frame, level, blocks)
+    pub fn block_keys(&self, frame: &Frame, device: &str, level: u8, blocks: &[[u32; 2]]) -> Result<Vec<String>> {
+        map3d_trace::block_keys(&self.store, frame, device, level, blocks)
     }
 
     /// Fails if a texture could not be read.

@@ -1,11 +1,11 @@
 //! Suns, ambient occlusion, second surfaces and pictures (spec/pyramid.md §10): against single rays, and laws of their own.
 
 use crate::town::{TempFolder, Town, frame, new_folder, waves};
-use map3d_base::vec3::{dot, normalized, scale};
 use map3d_base::layers::{AO, COLOR, DEPTH, DEPTH2, ID, NORMAL, PICTURE, SUN, SUN16};
+use map3d_base::vec3::{dot, normalized, scale};
 use map3d_base::{DEPTH_NOTHING, DEPTH_UNITS_PER_M, Frame, Isa, LayerFormat, LayerKind, LayerSpec, RAY_LIFT_M, Vec3, vec3};
 use map3d_image::{Arrays, GBuffer};
-use map3d_render::{RenderScene, TileRenderer};
+use map3d_render::{CPU, RenderScene, TileRenderer};
 
 const AFTERNOON: Vec3 = [0.6, -0.48, 0.64];
 const RADIUS_M: f64 = 12.0;
@@ -279,7 +279,7 @@ fn keys_change_where_a_shadow_falls() {
         let scene = town.open(&folder);
         let mut f = frame(0.0, 90.0, 128.0, 6);
         f.layers = vec![layer(kind)];
-        scene.block_keys(&f, 3, &places).expect("keys")
+        scene.block_keys(&f, CPU, 3, &places).expect("keys")
     };
     let changed = |kind: LayerKind| -> Vec<[u32; 2]> {
         let (a, b) = (keys(30.0, kind), keys(31.0, kind));

@@ -22,7 +22,7 @@ pub use beam::{BeamTracer, CurvedSurface, MIXED, NOTHING, Pixel, SUBTILE_PX, Vie
 pub use cutout::{Cutout, CutoutMask, CutoutSample, IgnoreCutouts};
 pub use depth_plane::DepthPlane;
 pub use map3d_base::Isa;
-pub use occupancy::{block_keys, occupied, occupied_within};
+pub use occupancy::{CPU, block_keys, occupied, occupied_within};
 pub use packet::{AmbientOcclusion, ClosestHits, HitMask, PACKET_SIZE, PacketOrigins, RayPackets, SceneRegion};
 pub use perspective::PerspectiveMap;
 pub use ray::{Hit, HitQuery, Ray, Rays};

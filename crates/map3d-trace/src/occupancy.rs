@@ -13,7 +13,7 @@ use map3d_scene::instances::{place, placed_box};
 use map3d_scene::records::{EMPTY, LEAF_BIT};
 use map3d_scene::{LazyChunk, Leaf, ScenePart, SceneStore};
 
-pub use keys::block_keys;
+pub use keys::{CPU, block_keys};
 use tile_set::{TileRange, TileSet};
 
 /// Boxes up to this fraction of a tile are marked as a whole.

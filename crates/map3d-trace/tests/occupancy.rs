@@ -7,7 +7,7 @@ use map3d_base::Frame;
 use map3d_base::asset::Rank;
 use map3d_base::tile::morton;
 use map3d_scene::SceneStore;
-use map3d_trace::{BeamTracer, IgnoreCutouts, SUBTILE_PX, block_keys, occupied, occupied_within};
+use map3d_trace::{BeamTracer, CPU, IgnoreCutouts, SUBTILE_PX, block_keys, occupied, occupied_within};
 
 fn houses(seed: u64) -> Soup {
     let mut dice = Lcg(seed);
@@ -145,7 +145,8 @@ fn a_block_key_changes_with_the_content_of_its_block() {
     let store = build(&folder, &soup);
     let mut frame = frame(0.0, 90.0, 128.0);
     frame.zmax = 4;
-    let keys = |store: &SceneStore| -> Vec<String> { (0..4).flat_map(|k| block_keys(store, &frame, 1, &[[k % 2, k / 2]]).expect("keys")).collect() };
+    let keys =
+        |store: &SceneStore| -> Vec<String> { (0..4).flat_map(|k| block_keys(store, &frame, CPU, 1, &[[k % 2, k / 2]]).expect("keys")).collect() };
     let before = keys(&store);
     assert_eq!(before, keys(&open(&folder)), "the same in every process");
     // One more house, in the north-east.
@@ -155,12 +156,14 @@ fn a_block_key_changes_with_the_content_of_its_block() {
     let changed: Vec<bool> = before.iter().zip(&after).map(|(a, b)| a != b).collect();
     assert_eq!(changed, [false, true, false, false]);
     let all: Vec<[u32; 2]> = (0..4).map(|k| [k % 2, k / 2]).collect();
-    assert_eq!(block_keys(&open(&folder), &frame, 1, &all).expect("keys"), after, "one by one or together");
-    assert!(block_keys(&store, &frame, 1, &[[0, 0], [0, 2]]).is_err());
+    assert_eq!(block_keys(&open(&folder), &frame, CPU, 1, &all).expect("keys"), after, "one by one or together");
+    assert!(block_keys(&store, &frame, CPU, 1, &[[0, 0], [0, 2]]).is_err());
+    let elsewhere = block_keys(&open(&folder), &frame, "gpu", 1, &all).expect("keys");
+    assert!(elsewhere.iter().zip(&after).all(|(a, b)| a != b), "a class of devices with other bytes has other keys");
     frame.pitch_deg = 89.0;
-    let turned = block_keys(&open(&folder), &frame, 1, &[[0, 0]]).expect("keys");
+    let turned = block_keys(&open(&folder), &frame, CPU, 1, &[[0, 0]]).expect("keys");
     assert_ne!(turned[0], after[0]);
-    assert!(block_keys(&store, &frame, 1, &[[2, 0]]).is_err());
+    assert!(block_keys(&store, &frame, CPU, 1, &[[2, 0]]).is_err());
 }
 
 #[test]
@@ -171,12 +174,12 @@ fn a_key_changes_if_and_only_if_content_of_its_block_does() {
     let mut frame = frame(30.0, 45.0, 128.0);
     frame.zmax = 6;
     let places: Vec<[u32; 2]> = (0..64).map(|k| [k % 8, k / 8]).collect();
-    let before = block_keys(&open(&folder), &frame, 3, &places).expect("keys");
+    let before = block_keys(&open(&folder), &frame, CPU, 3, &places).expect("keys");
     assert_eq!(before.iter().collect::<std::collections::BTreeSet<_>>().len(), 64, "empty blocks have keys of their own too");
     let (old, new) = (soup.faces[0].corners, soup.faces[0].corners.map(|p| [p[0] + 3.0, p[1], p[2]]));
     soup.faces[0].corners = new;
     rebuild(&folder, &soup);
-    let after = block_keys(&open(&folder), &frame, 3, &places).expect("keys");
+    let after = block_keys(&open(&folder), &frame, CPU, 3, &places).expect("keys");
     // The object of the face is its house of four triangles.
     let house: Vec<[f64; 3]> = soup.faces.iter().filter(|f| f.object == 0).flat_map(|f| f.corners).chain(old).collect();
     let axes = frame.axes();

@@ -11,9 +11,13 @@ use twox_hash::XxHash3_128;
 use super::reach::Reach;
 use super::{TileRect, TileView};
 
-/// Returns the keys of base blocks of one level, (x, y) each: hex hashes over everything that their bytes depend on, which is the format, the frame, and
-/// every object and instance whose box meets the block's beam, casts a shadow into it or occludes ambient light there. Opens every chunk once.
-pub fn block_keys(scene: &SceneStore, frame: &Frame, level: u8, blocks: &[[u32; 2]]) -> Result<Vec<String>> {
+/// The class of devices that render by default.
+pub const CPU: &str = "cpu";
+
+/// Returns the keys of base blocks of one level, (x, y) each: hex hashes over everything that their bytes depend on, which is the format, the class of devices
+/// that render, the frame, and every object and instance whose box meets the block's beam, casts a shadow into it or occludes ambient light there. Opens
+/// every chunk once.
+pub fn block_keys(scene: &SceneStore, frame: &Frame, device: &str, level: u8, blocks: &[[u32; 2]]) -> Result<Vec<String>> {
     frame.validate()?;
     if let Some([x, y]) = blocks.iter().find(|[x, y]| level > DEEPEST_LEVEL || x >> level != 0 || y >> level != 0) {
         return Err(Error::argument(format!("block {level}/{x}/{y} does not exist")));
@@ -37,7 +41,7 @@ pub fn block_keys(scene: &SceneStore, frame: &Frame, level: u8, blocks: &[[u32; 
             sums.add(&Box3 { lo: [b[0], b[1], b[2]], hi: [b[3], b[4], b[5]] }, object.id, object.content);
         }
     }
-    Ok(blocks.iter().zip(&sums.sums).map(|(block, sum)| finish(frame, level, *block, sum)).collect())
+    Ok(blocks.iter().zip(&sums.sums).map(|(block, sum)| finish(frame, device, level, *block, sum)).collect())
 }
 
 /// Per block, the number of objects and instances that meet its beam and the sum of their hashes modulo 2^128, so that their order does not matter.
@@ -105,11 +109,15 @@ fn content_hash(id: u32, content: [u64; 2]) -> u128 {
     XxHash3_128::oneshot(bytemuck::bytes_of(&[u64::from(id), content[0], content[1]]))
 }
 
-fn finish(frame: &Frame, level: u8, [x, y]: [u32; 2], (count, sum): &(u64, u128)) -> String {
+fn finish(frame: &Frame, device: &str, level: u8, [x, y]: [u32; 2], (count, sum): &(u64, u128)) -> String {
     let mut hash = XxHash3_128::with_seed(0);
     write_frame(&mut hash, frame, Tile { z: level, x, y });
     hash.write(&count.to_le_bytes());
     hash.write(&sum.to_le_bytes());
+    // Keys of the default class are older than classes.
+    if device != CPU {
+        hash.write(device.as_bytes());
+    }
     format!("{:032x}", hash.finish_128())
 }
 
