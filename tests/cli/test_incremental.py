@@ -14,7 +14,7 @@ from map3d.tiles.naming import block_levels
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import Box, TileId
 from tests.cli.test_whole import digest
-from tests.cli.towns import Run, house, write_town
+from tests.cli.towns import Run, copy_original, house, make_original, write_town
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 pytestmark = pytest.mark.whole
@@ -23,16 +23,24 @@ VIEWS = ("--view", "0/45", "--view", "90/30")
 Blocks = dict[tuple[str, str], str]
 
 
-@pytest.fixture
-def town(run: Run, tmp_path: Path) -> Workspace:
-    """A complete rendering `view` of the scene `town`: one file per house, and one for the ground."""
-    assert run("create-scene", "town")[0] == 0
-    files = write_town(tmp_path / "files")
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("original")
+    files = write_town(folder / "files")
     (files / "ground.obj").write_text("v -60 -60 -1\nv 190 -60 -1\nv 190 190 -1\nv -60 190 -1\nf 1 2 3 4\n")
-    assert run("add-files", "town", str(files))[0] == 0
-    assert run("create-rendering", "town", "view", "--res", "0.05", *VIEWS)[0] == 0
-    assert run("render", "view")[0] == 0
-    return Workspace(tmp_path / "workspace")
+    return make_original(
+        folder,
+        ("create-scene", "town"),
+        ("add-files", "town", str(files)),
+        ("create-rendering", "town", "view", "--res", "0.05", *VIEWS),
+        ("render", "view"),
+    )
+
+
+@pytest.fixture
+def town(original: Path, tmp_path: Path) -> Workspace:
+    """A complete rendering `view` of the scene `town`: one file per house, and one for the ground."""
+    return copy_original(original, tmp_path)
 
 
 def keys(workspace: Workspace) -> Blocks:

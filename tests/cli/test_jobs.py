@@ -12,7 +12,7 @@ from map3d.catalogue import State, Workspace
 from map3d.tiles.naming import block_levels
 from tests.cli.test_verify_pixels import swap_two_images
 from tests.cli.test_whole import digest
-from tests.cli.towns import Run, write_town
+from tests.cli.towns import Run, copy_original, make_original, write_town
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 pytestmark = pytest.mark.whole
@@ -20,19 +20,22 @@ pytestmark = pytest.mark.whole
 TRACK = "0-45"
 
 
-@pytest.fixture
-def town(run: Run, tmp_path: Path) -> Workspace:
-    """The scene `town` with an empty rendering `view`."""
-    assert run("create-scene", "town")[0] == 0
-    assert run("add-files", "town", str(write_town(tmp_path / "files", 3)))[0] == 0
-    assert run("create-rendering", "town", "view", "--res", "0.05", "--view", "0/45")[0] == 0
-    return Workspace(tmp_path / "workspace")
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("original")
+    return make_original(
+        folder,
+        ("create-scene", "town"),
+        ("add-files", "town", str(write_town(folder / "files", 3))),
+        ("create-rendering", "town", "view", "--res", "0.05", "--view", "0/45"),
+        ("render", "view"),
+    )
 
 
 @pytest.fixture
-def rendered(run: Run, town: Workspace) -> Workspace:
-    assert run("render", "view")[0] == 0
-    return town
+def rendered(original: Path, tmp_path: Path) -> Workspace:
+    """The complete rendering `view` of the scene `town`."""
+    return copy_original(original, tmp_path)
 
 
 def base_block(workspace: Workspace, number: int = 0) -> str:
@@ -104,8 +107,7 @@ def test_jobs_shows_all_renderings_and_one(run: Run, rendered: Workspace) -> Non
     assert run("jobs", "--help")[0] == 0
 
 
-def test_watch_in_a_pipe_prints_one_line_per_refresh(run: Run, town: Workspace) -> None:
-    assert run("render", "view")[0] == 0
+def test_watch_in_a_pipe_prints_one_line_per_refresh(run: Run, rendered: Workspace) -> None:
     status, out, _ = run("jobs", "view", "--watch", "--every", "0.1")
     assert (status, len(out.splitlines())) == (0, 1)
     assert out.startswith("view: 100 %")
@@ -113,10 +115,9 @@ def test_watch_in_a_pipe_prints_one_line_per_refresh(run: Run, town: Workspace) 
     assert json.loads(out)[0]["rendering"] == "view"
 
 
-def test_jobs_shows_leases_with_host_and_time(run: Run, town: Workspace) -> None:
-    assert run("render", "view")[0] == 0
-    catalogue = town.open_catalogue()
-    (z, x, y) = (int(part) for part in base_block(town).split("/"))
+def test_jobs_shows_leases_with_host_and_time(run: Run, rendered: Workspace) -> None:
+    catalogue = rendered.open_catalogue()
+    (z, x, y) = (int(part) for part in base_block(rendered).split("/"))
     catalogue.reopen("view", [(TRACK, type(next(iter(catalogue.jobs("view"))).block)(z, x, y))])
     lease = catalogue.lease("view", "node-7.0123abcd.42.99.1")
     assert lease is not None

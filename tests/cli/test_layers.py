@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tests.cli.towns import Run, write_town
+from tests.cli.towns import Run, copy_original, make_original, write_town
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 pytestmark = pytest.mark.whole
@@ -16,12 +16,21 @@ PLACE = ("--place", "48.76,11.42")
 NEW = ("create-rendering", "town", "new", "--res", "0.2", "--view", "0/45")
 
 
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("original")
+    return make_original(
+        folder,
+        ("create-scene", "town"),
+        ("add-files", "town", str(write_town(folder / "files"))),
+        ("create-rendering", "town", "view", "--res", "0.2", "--view", "0/45"),
+    )
+
+
 @pytest.fixture
-def town(run: Run, tmp_path: Path) -> Run:
+def town(run: Run, original: Path, tmp_path: Path) -> Run:
     """A rendering `view` of the scene `town`, in local metres."""
-    assert run("create-scene", "town")[0] == 0
-    assert run("add-files", "town", str(write_town(tmp_path / "files")))[0] == 0
-    assert run("create-rendering", "town", "view", "--res", "0.2", "--view", "0/45")[0] == 0
+    copy_original(original, tmp_path)
     return run
 
 

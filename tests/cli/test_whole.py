@@ -18,22 +18,41 @@ from map3d.registry import Registry
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.sqlite_store import SqliteTileStore
 from tests.cli.tile_ids import ids_in_tiles
-from tests.cli.towns import Run, house, write_town
+from tests.cli.towns import Run, copy_original, house, make_original, write_town
 
 pytestmark = pytest.mark.whole
 
 VIEWS = ("--view", "0/45", "--view", "90/30")
 
 
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("original")
+    return make_original(
+        folder,
+        ("create-scene", "town"),
+        ("add-files", "town", str(write_town(folder / "files"))),
+        ("create-rendering", "town", "view", "--res", "0.05", *VIEWS),
+    )
+
+
+@pytest.fixture(scope="module")
+def original_with_tiles(original: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("original_with_tiles")
+    copy_original(original, folder)
+    return make_original(folder, ("render", "view"))
+
+
 @pytest.fixture
-def town(run: Run, tmp_path: Path) -> Workspace:
+def town(original: Path, tmp_path: Path) -> Workspace:
     """A planned rendering `view` of the scene `town`."""
-    assert run("create-scene", "town")[0] == 0
-    status, _, err = run("add-files", "town", str(write_town(tmp_path / "files")))
-    assert status == 0, err
-    status, _, err = run("create-rendering", "town", "view", "--res", "0.05", *VIEWS)
-    assert status == 0, err
-    return Workspace(tmp_path / "workspace")
+    return copy_original(original, tmp_path)
+
+
+@pytest.fixture
+def rendered(original_with_tiles: Path, tmp_path: Path) -> Workspace:
+    """The complete rendering `view` of the scene `town`."""
+    return copy_original(original_with_tiles, tmp_path)
 
 
 def need_viewer() -> None:
@@ -75,10 +94,9 @@ def test_files_become_tiles_that_verify(run: Run, town: Workspace) -> None:
     assert (status, json.loads(out)["wrong"]) == (0, []), err
 
 
-def test_ids_in_tiles_are_those_of_the_registry(run: Run, town: Workspace) -> None:
-    run("render", "view")
-    seen = ids_in_tiles(town)
-    with Registry(town.registry_path("town")) as registry:
+def test_ids_in_tiles_are_those_of_the_registry(run: Run, rendered: Workspace) -> None:
+    seen = ids_in_tiles(rendered)
+    with Registry(rendered.registry_path("town")) as registry:
         known = {item.id: item.name for item in registry.objects()}
     houses = {number for number, name in known.items() if name.startswith("house")}
     assert len(houses) == 16
@@ -86,12 +104,11 @@ def test_ids_in_tiles_are_those_of_the_registry(run: Run, town: Workspace) -> No
     assert seen - {0} <= set(known)
 
 
-def test_second_render_does_nothing(run: Run, town: Workspace) -> None:
-    run("render", "view")
-    before = (digest(town), town.manifest_path("view").read_bytes())
+def test_second_render_does_nothing(run: Run, rendered: Workspace) -> None:
+    before = (digest(rendered), rendered.manifest_path("view").read_bytes())
     status, out, _ = run("render", "view", "--json")
     assert (status, json.loads(out)["statistics"]["done"]) == (0, 0)
-    assert (digest(town), town.manifest_path("view").read_bytes()) == before
+    assert (digest(rendered), rendered.manifest_path("view").read_bytes()) == before
 
 
 def test_changed_house_renders_few_blocks_and_equals_a_full_render(run: Run, town: Workspace, tmp_path: Path) -> None:
@@ -112,38 +129,36 @@ def test_changed_house_renders_few_blocks_and_equals_a_full_render(run: Run, tow
         pytest.fail("the incremental tiles differ from those of a full render")
 
 
-def test_content_outside_the_frame_is_refused_until_regrid(run: Run, town: Workspace, tmp_path: Path) -> None:
-    run("render", "view")
-    before = digest(town)
+def test_content_outside_the_frame_is_refused_until_regrid(run: Run, rendered: Workspace, tmp_path: Path) -> None:
+    before = digest(rendered)
     far = tmp_path / "far.obj"
     far.write_text(house(600.0, 0.0, 10.0))
     run("add-files", "town", str(far))
     status, _, err = run("render", "view")
     assert (status, "--regrid" in err) == (1, True)
-    assert digest(town) == before
+    assert digest(rendered) == before
     assert run("create-rendering", "town", "view", "--res", "0.5", *VIEWS, "--regrid")[0] == 0
     assert run("render", "view")[0] == 0
     assert run("verify")[0] == 0
 
 
-def test_killed_render_resumes_and_ends_with_the_same_tiles(run: Run, town: Workspace) -> None:
-    run("render", "view")
-    undisturbed = digest(town)
-    for path in town.rendering_folder("view").iterdir():
+def test_killed_render_resumes_and_ends_with_the_same_tiles(run: Run, rendered: Workspace) -> None:
+    undisturbed = digest(rendered)
+    for path in rendered.rendering_folder("view").iterdir():
         path.unlink()
     assert run("create-rendering", "town", "view", "--res", "0.05", *VIEWS, "--regrid")[0] == 0
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     for done in (3, 8):
         process = subprocess.Popen([sys.executable, "-m", "map3d", "render", "view"], env=environment, stderr=subprocess.DEVNULL)
-        wait_for(town, done, process)
+        wait_for(rendered, done, process)
         process.send_signal(signal.SIGKILL)
         process.wait()
-    catalogue = town.open_catalogue(lease_s=0.1)
+    catalogue = rendered.open_catalogue(lease_s=0.1)
     with catalogue._database.transaction() as db:  # type: ignore[attr-defined]
         db.execute("UPDATE job SET expires = expires - 3600 WHERE state = 'leased'")
     catalogue.close()
     assert run("render", "view")[0] == 0
-    assert digest(town) == undisturbed
+    assert digest(rendered) == undisturbed
     assert run("verify")[0] == 0
 
 
@@ -167,22 +182,20 @@ def wait_for(town: Workspace, done: int, process: "subprocess.Popen[bytes]") -> 
         ("DELETE FROM tile WHERE z = 0", "parent is missing"),
     ],
 )
-def test_verify_finds_changes_to_the_store(run: Run, town: Workspace, statement: str, says: str) -> None:
-    run("render", "view")
-    with sqlite3.connect(town.store_path("view", "0-45")) as db:
+def test_verify_finds_changes_to_the_store(run: Run, rendered: Workspace, statement: str, says: str) -> None:
+    with sqlite3.connect(rendered.store_path("view", "0-45")) as db:
         assert db.execute(statement).rowcount > 0
     db.close()
     status, out, _ = run("verify")
     assert (status, says in out) == (1, True), out
 
 
-def test_verify_finds_a_broken_chunk_and_a_stale_manifest(run: Run, town: Workspace) -> None:
-    run("render", "view")
-    chunk = next(town.scene_folder("town").glob("chunks/*.m3c"))
+def test_verify_finds_a_broken_chunk_and_a_stale_manifest(run: Run, rendered: Workspace) -> None:
+    chunk = next(rendered.scene_folder("town").glob("chunks/*.m3c"))
     data = bytearray(chunk.read_bytes())
     data[-1] ^= 1
     chunk.write_bytes(data)
-    path = town.manifest_path("view")
+    path = rendered.manifest_path("view")
     path.write_text(path.read_text().replace('"content_version": 1', '"content_version": 9'))
     status, out, _ = run("verify")
     assert status == 1
@@ -266,10 +279,9 @@ def test_site_with_small_tiles(run: Run, tmp_path: Path) -> None:
     assert tiles_bytes[1] < 0.9 * tiles_bytes[0]
 
 
-def test_workspace_can_be_moved(run: Run, town: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run("render", "view")
+def test_workspace_can_be_moved(run: Run, rendered: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     moved = tmp_path / "elsewhere"
-    shutil.move(town.root, moved)
+    shutil.move(rendered.root, moved)
     monkeypatch.setenv("MAP3D_WORKSPACE", str(moved))
     assert run("verify")[0] == 0
     status, out, _ = run("render", "view", "--json")

@@ -1,7 +1,11 @@
-"""A small town of boxes as OBJ files, and the type of the `run` fixture."""
+"""A small town of boxes as OBJ files, workspaces of it that tests copy, and the type of the `run` fixture."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
+
+from map3d.catalogue import Workspace
+from map3d.cli import app
 
 Run = Callable[..., tuple[int, str, str]]
 """Takes the words of a command line; returns (status, output, errors)."""
@@ -22,3 +26,16 @@ def write_town(folder: Path, side: int = 4) -> Path:
         for j in range(side):
             (folder / f"house-{i}-{j}.obj").write_text(house(40.0 * i, 40.0 * j, 6.0 + (3 * i + 5 * j) % 7))
     return folder
+
+
+def make_original(folder: Path, *commands: tuple[str, ...]) -> Path:
+    """Runs command lines with the workspace `workspace` of the folder, which `copy_original` copies."""
+    for command in commands:
+        assert app.run([*command, "--workspace", str(folder / "workspace")]) == 0, command
+    return folder
+
+
+def copy_original(folder: Path, to: Path) -> Workspace:
+    """Copies the workspace and the files beside it; returns the copy of the workspace."""
+    shutil.copytree(folder, to, dirs_exist_ok=True)
+    return Workspace(to / "workspace")

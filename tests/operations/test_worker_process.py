@@ -62,8 +62,10 @@ with WorkerProcess(Path(sys.argv[1])) as worker:
 """
 
 
-def test_worker_of_a_killed_server_ends(scenario: Scenario) -> None:
-    server = subprocess.Popen([sys.executable, "-c", SERVER, str(scenario.workspace.root)], stdout=subprocess.PIPE, text=True)
+def test_worker_of_a_killed_server_ends(scenario: Scenario, tmp_path: Path) -> None:
+    # A killed server cannot remove its temporary folder.
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    server = subprocess.Popen([sys.executable, "-c", SERVER, str(scenario.workspace.root)], stdout=subprocess.PIPE, text=True, env=environment)
     with server:
         assert server.stdout is not None
         pid = int(server.stdout.readline())
