@@ -157,6 +157,7 @@ bench-rotterdam: build ## measure a city of 62,000 buildings from files to a pub
 
 docs: build reference peers ## regenerate the pictures (CesiumJS from npm, 230 MB) and command reference in docs/, and the viewer's reference
 	$(BIN)/python docs/make_cli.py
+	$(BIN)/python docs/make_map.py
 	$(BIN)/python docs/pictures/make.py .cache/pictures
 
 reference: $(CACHE)/npm ## write the viewer's reference to viewer/reference/
