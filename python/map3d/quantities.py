@@ -1,6 +1,10 @@
 """Quantities as text: counts, sizes, durations, lists of names."""
 
+import re
 from collections.abc import Sequence
+from typing import Final
+
+_UNITS: Final = {"": 1, "k": 1 << 10, "m": 1 << 20, "g": 1 << 30, "t": 1 << 40}
 
 
 def plural(count: int, noun: str) -> str:
@@ -28,3 +32,9 @@ def time_text(seconds: float) -> str:
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
+
+
+def parse_size(text: str) -> int | None:
+    """Returns the bytes of a size such as `512M` or `2G`; None for other text."""
+    match = re.fullmatch(r"([0-9]+(?:\.[0-9]+)?)\s*([kmgt]?)i?b?", text.strip().lower())
+    return int(float(match[1]) * _UNITS[match[2]]) if match is not None and float(match[1]) > 0 else None

@@ -8,7 +8,7 @@ import pytest
 
 from map3d import __version__
 from map3d.cli.app import COMMANDS
-from map3d.cli.options import Bytes, View
+from map3d.cli.option_types import Bytes, View
 from map3d.types import ViewAngles
 from tests.cli.towns import Run
 

@@ -16,9 +16,9 @@ from map3d.ingest.sources import find_sources
 from map3d.jobs.run import Run
 from map3d.jobs.run_settings import RunSettings
 from map3d.renderings.build import BUILD_BYTES, build
-from map3d.renderings.create import RenderingRequest, create_rendering
-from map3d.renderings.layers import LayerRequest
+from map3d.renderings.create import create_rendering
 from map3d.renderings.track_stores import open_track
+from map3d.requests import CreateRendering
 from map3d.types import ViewAngles
 
 SCENE: Final = "street"
@@ -80,8 +80,9 @@ def make_workspace(root: Path, houses: int, variant: int = 0, catalogue_url: str
         catalogue.create_scene(SceneRecord(SCENE))
         import_variant(workspace, catalogue, street_file(root / "files", variant, houses))
         build(workspace, catalogue, SCENE, threads=1, max_memory_bytes=BUILD_BYTES)
-        layers = LayerRequest(("color", "id"), color="png")
-        create_rendering(workspace, catalogue, RenderingRequest(SCENE, RENDERING, VIEWS, RES_M, layers=layers))
+        layers = ("color", "id")
+        request = CreateRendering(scene=SCENE, name=RENDERING, views=tuple(VIEWS), res_m=RES_M, layers=layers, color="png")
+        create_rendering(workspace, catalogue, request)
     finally:
         catalogue.close()
     return workspace

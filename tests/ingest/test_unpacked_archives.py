@@ -20,11 +20,11 @@ def test_archive_is_imported_like_a_folder_and_leaves_nothing(tmp_path: Path) ->
     catalogue = workspace.open_catalogue()
     catalogue.create_scene(SceneRecord("town"))
     archive = write_zip(tmp_path / "town.zip", {"a.obj": BOX, "deep/b.obj": BOX, "bad.gml": b"no GML"})
-    done = import_files(workspace, catalogue, "town", [archive], ImportOptions("local"))
+    done = import_files(workspace, catalogue, "town", [archive], ImportOptions(crs="local"))
     assert sorted(item.asset for item in done.imported) == ["a", "b"]
     assert [path for path, _ in done.failed] == [f"{archive}/bad.gml"]
     outside = write_zip(tmp_path / "outside.zip", {"../a.obj": BOX})
     with pytest.raises(ImportFailed, match="outside the folder"):
-        import_files(workspace, catalogue, "town", [outside], ImportOptions("local"))
+        import_files(workspace, catalogue, "town", [outside], ImportOptions(crs="local"))
     assert not list((workspace.scene_folder("town") / "assets").glob(".*"))
     catalogue.close()

@@ -16,9 +16,9 @@ from map3d.jobs.run import Run, RunPlan, RunResult
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.timeouts import Timeouts
 from map3d.renderings.create import add_layers, add_views
-from map3d.renderings.layers import LayerRequest
 from map3d.renderings.manifest_writer import stored_occupancy, write_manifest
 from map3d.renderings.plan import planned_occupancy
+from map3d.requests import AddLayers
 from map3d.tiles.block_versions import BlockVersions
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.sqlite_store import SqliteTileStore
@@ -96,7 +96,7 @@ def test_manifest_from_the_jobs_equals_the_one_from_the_stores(workspace: Worksp
     for content in (CONTENT, {**CONTENT, (0.31, 0.9): "one more"}, dict(list(CONTENT.items())[2:])):
         run_all(workspace, catalogue, SquareScene(content))
         assert workspace.manifest_path("r").read_bytes() == from_stores(workspace, catalogue)
-    add_layers(catalogue, "r", LayerRequest(("again=normal",)))
+    add_layers(catalogue, "r", AddLayers(layers=("again=normal",)))
     run_all(workspace, catalogue, SquareScene(CONTENT))
     assert workspace.manifest_path("r").read_bytes() == from_stores(workspace, catalogue)
 
@@ -159,7 +159,7 @@ def stored(workspace: Workspace) -> dict[tuple[str, int, TileId], bytes | None]:
 def test_added_layers_render_only_their_own_tracks(workspace: Workspace, catalogue: Catalogue) -> None:
     first, _ = run_all(workspace, catalogue, SquareScene(CONTENT))
     before, jobs = stored(workspace), {(job.track, job.block): job for job in catalogue.jobs("r")}
-    add_layers(catalogue, "r", LayerRequest(("normal", "deep=depth")))
+    add_layers(catalogue, "r", AddLayers(layers=("normal", "deep=depth")))
     plan, result = run_all(workspace, catalogue, SquareScene(CONTENT))
     assert (plan.counts.added, plan.counts.changed, plan.counts.kept) == (first.open_jobs, 0, first.open_jobs)
     assert (result.statistics.done, result.complete, result.content_version) == (first.open_jobs, True, 2)
@@ -175,7 +175,7 @@ def test_added_layers_render_only_their_own_tracks(workspace: Workspace, catalog
 
 def test_added_view_gets_every_pass(workspace: Workspace, catalogue: Catalogue) -> None:
     run_all(workspace, catalogue, SquareScene(CONTENT))
-    add_layers(catalogue, "r", LayerRequest(("normal",)))
+    add_layers(catalogue, "r", AddLayers(layers=("normal",)))
     add_views(catalogue, "r", [ViewAngles(180, 45)])
     assert run_all(workspace, catalogue, SquareScene(CONTENT))[1].complete
     tracks = {job.track for job in catalogue.jobs("r")}
@@ -187,7 +187,7 @@ def test_added_view_gets_every_pass(workspace: Workspace, catalogue: Catalogue) 
 def test_occupancy_stays_exact_until_added_layers_are_rendered(workspace: Workspace, catalogue: Catalogue) -> None:
     run_all(workspace, catalogue, SquareScene(CONTENT))
     before = manifest(workspace)
-    add_layers(catalogue, "r", LayerRequest(("normal",)))
+    add_layers(catalogue, "r", AddLayers(layers=("normal",)))
     Run(workspace, catalogue, "r", SETTINGS).plan(scene=SquareScene(CONTENT))
     found = manifest(workspace)
     assert (found.complete, found.content_version) == (False, 2)
@@ -196,7 +196,7 @@ def test_occupancy_stays_exact_until_added_layers_are_rendered(workspace: Worksp
 
 
 def test_change_renders_the_blocks_of_every_pass(workspace: Workspace, catalogue: Catalogue) -> None:
-    add_layers(catalogue, "r", LayerRequest(("normal",)))
+    add_layers(catalogue, "r", AddLayers(layers=("normal",)))
     run_all(workspace, catalogue, SquareScene(CONTENT))
     changed = {**CONTENT, next(iter(CONTENT)): "another thing"}
     plan, result = run_all(workspace, catalogue, SquareScene(changed))
@@ -210,7 +210,7 @@ def test_change_renders_the_blocks_of_every_pass(workspace: Workspace, catalogue
 def test_duplicate_or_unknown_layers_are_refused(catalogue: Catalogue, names: tuple[str, ...]) -> None:
     before = record(catalogue)
     with pytest.raises(BadRequest):
-        add_layers(catalogue, "r", LayerRequest(names))
+        add_layers(catalogue, "r", AddLayers(layers=names))
     assert record(catalogue) == before
 
 

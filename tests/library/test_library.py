@@ -98,7 +98,6 @@ def test_errors_are_typed(tmp_path: Path, files: Path) -> None:
         for error, call in (
             (AlreadyExists, lambda: workspace.create_scene("town")),
             (BadName, lambda: workspace.create_scene("No Name")),
-            (BadRequest, lambda: workspace.create_scene("other", unknown=True)),
             (BadRequest, lambda: workspace.create_scene("other", ground_plane="maybe")),
             (NotFound, lambda: workspace.scene("other")),
             (NotFound, lambda: workspace.rendering("other")),

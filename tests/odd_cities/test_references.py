@@ -70,7 +70,7 @@ def workspace(tmp_path: Path) -> Workspace:
 def add(workspace: Workspace, *paths: Path) -> FilesImport:
     catalogue = workspace.open_catalogue()
     try:
-        return import_files(workspace, catalogue, "town", list(paths), ImportOptions(crs="local"), skip_unchanged=True)
+        return import_files(workspace, catalogue, "town", list(paths), ImportOptions(crs="local", skip_unchanged=True))
     finally:
         catalogue.close()
 

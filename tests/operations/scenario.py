@@ -14,9 +14,9 @@ from map3d.catalogue import Catalogue, OperationRecord, OperationState, Workspac
 from map3d.operations.operation_worker import OperationWorker
 from map3d.operations.request_operation import request_operation
 from map3d.operations.uploaded_files import uploads_folder
-from map3d.renderings.create import RenderingRequest, create_rendering
-from map3d.renderings.create_scene import SceneRequest, create_scene
-from map3d.renderings.layers import LayerRequest
+from map3d.renderings.create import create_rendering
+from map3d.renderings.create_scene import create_scene
+from map3d.requests import CreateRendering, CreateScene
 from map3d.types import ViewAngles
 from map3d.uploads import Uploads
 from tests.cli.towns import house
@@ -83,8 +83,8 @@ class Scenario:
         return self.catalogue.operation(asked.id)
 
     def create_rendering(self) -> None:
-        layers = LayerRequest(("color", "id"))
-        create_rendering(self.workspace, self.catalogue, RenderingRequest("town", "town", [ViewAngles(0, 45)], 0.1, layers=layers))
+        request = CreateRendering(scene="town", name="town", views=(ViewAngles(0, 45),), res_m=0.1, layers=("color", "id"))
+        create_rendering(self.workspace, self.catalogue, request)
 
     def log(self, operation: OperationRecord) -> str:
         return "\n".join(line.text for line in self.catalogue.operation_log(operation.id))
@@ -94,7 +94,7 @@ def open_scenario(folder: Path, catalogue_url: str | None = None) -> Scenario:
     workspace = Workspace(folder, catalogue_url).create()
     catalogue = workspace.open_catalogue()
     if not catalogue.scenes():
-        create_scene(workspace, catalogue, SceneRequest("town"))
+        create_scene(workspace, catalogue, CreateScene(name="town"))
     return Scenario(workspace, catalogue)
 
 

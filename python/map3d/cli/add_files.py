@@ -9,10 +9,12 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from map3d.catalogue import Workspace
 from map3d.catalogue.records import LOCAL_CRS_NAME
+from map3d.cli.from_request import request_options
 from map3d.cli.import_reports import asset_warning_lines, left_alone_lines, place_line
-from map3d.cli.options import Bytes, format_options, json_option, workspace_option
+from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import print_json, print_table
 from map3d.cli.progress import progress_bar
+from map3d.requests import AddFiles
 
 if TYPE_CHECKING:
     from map3d.ingest.import_files import OnFile
@@ -21,19 +23,10 @@ if TYPE_CHECKING:
 @click.command("add-files")
 @click.argument("scene")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--crs", help="Coordinate system of the files, where they do not state it or state it wrongly; 'local' for local metres.")
-@click.option("--name", help="Name of the asset.  [default: name of the file]")
-@format_options
-@click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping and counting it.")
-@click.option(
-    "--parse-memory", "parse_memory_bytes", type=Bytes(), help="Memory limit for reading a file.  [default: 1G; 2G for rasters and above 100 MB]"
-)
-@click.option(
-    "--parse-cpu", "parse_cpu_s", type=click.IntRange(1), help="Limit in CPU seconds for reading a file.  [default: 60 per 100 MB; 600 for rasters]"
-)
+@request_options(AddFiles)
 @json_option
 @workspace_option
-def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bool, name: str | None, **options: Any) -> None:
+def command(workspace: Workspace, scene: str, files: Sequence[Path], request: AddFiles, as_json: bool) -> None:
     """Import FILES into SCENE: CityGML, OBJ, and GeoTIFF rasters of elevation and imagery. For a folder or a ZIP
     archive, import every file in a known format.
 
@@ -47,7 +40,7 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], as_json: bo
     with workspace.open_catalogue() as catalogue:
         with progress_bar(*columns) as bar:
             show = _show(bar, bar.add_task("importing", total=None))
-            result = import_files(workspace, catalogue, scene, files, ImportOptions(**options, virtual_rasters=True), name=name, progress=show)
+            result = import_files(workspace, catalogue, scene, files, ImportOptions.of(request, virtual_rasters=True), progress=show)
         place = place_line(workspace, catalogue, scene)
     done, failed = result.imported, result.failed
     if as_json:

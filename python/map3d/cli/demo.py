@@ -9,7 +9,8 @@ import click
 
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
-from map3d.cli.layer_options import data_option
+from map3d.cli.from_request import request_option
+from map3d.requests import Site
 from map3d.types import DEFAULT_DATA, LAYERS_BY_DATA, DataEncoding
 
 TOWN: Final = ("--buildings", "120", "--seed", "7")
@@ -29,7 +30,7 @@ SCENE: Final = "town"
 @click.option("--folder", type=click.Path(path_type=Path, file_okay=False), default=Path("map3d-demo"), show_default=True, help="Output folder.")
 @click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="a free port", help="Port to listen on.")
 @click.option("--no-serve", is_flag=True, help="Stop after rendering.")
-@data_option()
+@request_option(Site, "data")
 def command(folder: Path, port: int, no_serve: bool, data: DataEncoding) -> None:
     """Generate a town, render it, serve it and print the address of its map.
 

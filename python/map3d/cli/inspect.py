@@ -8,10 +8,12 @@ import click
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from map3d.cli.file_tables import MAX_ROWS, findings_lines, kinds_text, print_files, textures_text
+from map3d.cli.from_request import request_options
 from map3d.cli.import_reports import left_alone_lines
-from map3d.cli.options import Bytes, format_options, json_option
+from map3d.cli.options import json_option
 from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.progress import progress_bar
+from map3d.requests import Inspect
 
 if TYPE_CHECKING:
     from map3d.catalogue import SceneCrs
@@ -22,16 +24,9 @@ if TYPE_CHECKING:
 
 @click.command("inspect")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--crs", help="Coordinate system of the files, where they do not state it or state it wrongly; 'local' for local metres.")
-@format_options
-@click.option(
-    "--parse-memory", "parse_memory_bytes", type=Bytes(), help="Memory limit for reading a file.  [default: 1G; 2G for rasters and above 100 MB]"
-)
-@click.option(
-    "--parse-cpu", "parse_cpu_s", type=click.IntRange(1), help="Limit in CPU seconds for reading a file.  [default: 60 per 100 MB; 600 for rasters]"
-)
+@request_options(Inspect)
 @json_option
-def command(files: Sequence[Path], as_json: bool, **options: Any) -> None:
+def command(files: Sequence[Path], request: Inspect, as_json: bool) -> None:
     """Say what FILES hold before importing them: coordinate system, place, extent, objects, textures and defects.
 
     FILES are read as an import into one scene reads them; for a folder, every file in a known format. Nothing is imported.
@@ -41,7 +36,7 @@ def command(files: Sequence[Path], as_json: bool, **options: Any) -> None:
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with progress_bar(*columns) as bar:
-        found = inspect_files(files, ImportOptions(**options, virtual_rasters=True), _show(bar, bar.add_task("reading")))
+        found = inspect_files(files, ImportOptions.of(request, virtual_rasters=True), _show(bar, bar.add_task("reading")))
     if as_json:
         print_json(found)
     else:

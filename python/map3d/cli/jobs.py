@@ -14,11 +14,13 @@ from rich.live import Live
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
 from map3d.catalogue import Catalogue, Workspace
+from map3d.cli.from_request import request_option
 from map3d.cli.job_tables import Detail, Overview, load_progress
-from map3d.cli.options import json_option, max_memory_option, workspace_option
+from map3d.cli.options import json_option, workspace_option
 from map3d.cli.ordered_group import OrderedGroup
 from map3d.cli.output import counts_text, plural, print_json, size_text
 from map3d.cli.progress import progress_bar, show_stage
+from map3d.requests.scenes import WorkLimits
 from map3d.types import BlockId
 
 if TYPE_CHECKING:
@@ -179,11 +181,11 @@ class Block(click.ParamType):  # type: ignore[type-arg]
 @click.argument("block", type=Block())
 @click.option("--track", help="Track of the block, as map3d jobs shows it.  [default: those in which the block is in quarantine]")
 @click.option("--timeout", type=click.FloatRange(min=0, min_open=True), help="Seconds that the block may take.  [default: 900, as in a render]")
-@max_memory_option
+@request_option(WorkLimits, "max_memory_bytes")
 @json_option
 @workspace_option
 def reproduce_block(
-    workspace: Workspace, rendering: str, block: BlockId, track: str | None, timeout: float | None, max_memory: int | None, as_json: bool
+    workspace: Workspace, rendering: str, block: BlockId, track: str | None, timeout: float | None, max_memory_bytes: int | None, as_json: bool
 ) -> None:
     """Render one BLOCK of RENDERING alone, as a worker would, and print what happens.
 
@@ -192,7 +194,7 @@ def reproduce_block(
     from map3d.jobs.reproduce import reproduce
     from map3d.jobs.run_settings import RunSettings
 
-    settings = RunSettings(1, max_memory)
+    settings = RunSettings(1, max_memory_bytes)
     if timeout is not None:
         settings = replace(settings, timeouts=replace(settings.timeouts, block_s=timeout))
     with workspace.open_catalogue() as catalogue:

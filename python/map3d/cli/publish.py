@@ -7,49 +7,37 @@ from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, Task, T
 from rich.text import Text
 
 from map3d.catalogue import Workspace
+from map3d.cli.from_request import request_options
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import plural, print_json, print_table, size_text
 from map3d.cli.progress import progress_bar, show_stage
+from map3d.requests import Publish
 
 
 @click.command("publish")
 @click.argument("rendering")
-@click.option("-o", "--out", metavar="FOLDER|URL", required=True, help="Output folder, or the URL of an object store, e.g. s3://BUCKET/PREFIX.")
-@click.option("--replace", is_flag=True, help="Update an earlier publication: only files whose content changed are written or sent.")
-@click.option("--allow-incomplete", is_flag=True, help="Publish even if blocks are missing.")
-@click.option("--url", metavar="ADDRESS", help="Address of the map's page, which links to it need to show its picture.")
-@click.option("--gis", is_flag=True, help="Also write colour tiles as files, with layer definitions for QGIS and GDAL in the folder gis.")
-@click.option("--dry-run", is_flag=True, help="Print what would be written or sent, and its size, without doing so.")
+@request_options(Publish, out={"required": True})
 @json_option
 @workspace_option
-def command(
-    workspace: Workspace,
-    rendering: str,
-    out: str,
-    replace: bool,
-    allow_incomplete: bool,
-    url: str | None,
-    gis: bool,
-    dry_run: bool,
-    as_json: bool,
-) -> None:
+def command(workspace: Workspace, rendering: str, request: Publish, as_json: bool) -> None:
     """Publish RENDERING as static files: tiles, objects, viewer.
 
     FOLDER can be copied to any web server that supports range requests. URL is a place in an object store; credentials come from the environment
     (AWS_*, GOOGLE_*, AZURE_*)."""
-    done = publish_with_progress(workspace, rendering, out, replace=replace, allow_incomplete=allow_incomplete, url=url, gis=gis, dry_run=dry_run)
+    names = ("replace", "allow_incomplete", "url", "gis", "dry_run")
+    done = publish_with_progress(workspace, rendering, request.out, **{name: getattr(request, name) for name in names})
     if as_json:
         print_json(done)
         return
     rows = [(row.part, row.view or "", row.layer or "", row.files, size_text(row.bytes)) for row in done.sizes]
     print_table(("part", "view", "layer", "files", "size"), [*rows, ("total", "", "", done.files, size_text(done.bytes))])
-    verb, written, removed = ("would publish", "to write", "to remove") if dry_run else ("published", "written", "removed")
-    about = "about " if dry_run and done.written else ""
+    verb, written, removed = ("would publish", "to write", "to remove") if request.dry_run else ("published", "written", "removed")
+    about = "about " if request.dry_run and done.written else ""
     click.echo(
-        f"{verb} {rendering} to {out}: {plural(done.tiles, 'image')} in {plural(done.archives, 'archive')}, {size_text(done.bytes)}; "
+        f"{verb} {rendering} to {request.out}: {plural(done.tiles, 'image')} in {plural(done.archives, 'archive')}, {size_text(done.bytes)}; "
         f"{written}: {plural(done.written, 'file')}, {about}{size_text(done.written_bytes)}; {removed}: {done.removed:,}"
     )
-    if gis:
+    if request.gis:
         files = next((row for row in done.sizes if row.part == "gis"), None)
         count, size = (0, 0) if files is None else (files.files, files.bytes)
         click.echo(f"for GIS software: {plural(count, 'file')} in the folder gis, {size_text(size)}")

@@ -8,9 +8,11 @@ import click
 from map3d.catalogue import Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.confirmation import confirm, yes_option
+from map3d.cli.from_request import request_options
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import names_text, plural, print_json, size_text
 from map3d.cores import usable_cores
+from map3d.requests import RemoveScene
 
 if TYPE_CHECKING:
     from map3d.publish.published_folders import PublishedFolder
@@ -83,11 +85,11 @@ def remove_rendering(workspace: Workspace, rendering: str, yes: bool, as_json: b
 
 @click.command("remove-scene")
 @click.argument("scene")
-@click.option("--with-renderings", is_flag=True, help="Remove its renderings too.")
+@request_options(RemoveScene)
 @yes_option
 @json_option
 @workspace_option
-def remove_scene(workspace: Workspace, scene: str, with_renderings: bool, yes: bool, as_json: bool) -> None:
+def remove_scene(workspace: Workspace, scene: str, request: RemoveScene, yes: bool, as_json: bool) -> None:
     """Remove SCENE with everything imported into it. The source files and published folders stay;
     those in the workspace are listed.
 
@@ -100,7 +102,7 @@ def remove_scene(workspace: Workspace, scene: str, with_renderings: bool, yes: b
     with workspace.open_catalogue() as catalogue:
         for record in catalogue.renderings(scene):
             expire_dead_workers(catalogue, record.name)
-        found = find_scene(workspace, catalogue, scene, with_renderings=with_renderings)
+        found = find_scene(workspace, catalogue, scene, with_renderings=request.with_renderings)
         names = [rendering.name for rendering in found.renderings]
         renderings = f" and the {'rendering' if len(names) == 1 else 'renderings'} {names_text(names)}" if names else ""
         confirm(f"this removes the scene {scene} with {plural(found.files, 'file')}{renderings}, {size_text(found.total_bytes)}", yes=yes)

@@ -9,9 +9,11 @@ from rich.progress import MofNCompleteColumn
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
-from map3d.cli.options import json_option, max_memory_option, workers_option, workspace_option
+from map3d.cli.from_request import request_options
+from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.render_stats import print_summary, summary
+from map3d.requests import Render
 
 if TYPE_CHECKING:
     from map3d.jobs.dask_pool import DaskPools
@@ -21,25 +23,11 @@ if TYPE_CHECKING:
 
 @click.command("render")
 @click.argument("rendering")
-@workers_option
-@max_memory_option
+@request_options(Render)
 @click.option("--stats", "with_stats", is_flag=True, help="Print the time spent in each stage and the hit rates of the caches.")
-@click.option("--dask", metavar="ADDRESS", help="Render on the Dask cluster with this scheduler, e.g. tcp://10.0.0.1:8786, instead of here.")
-@click.option("--dask-workspace", metavar="FOLDER", help="Workspace folder on the Dask workers.  [default: the same path as here]")
-@click.option("--plan-only", is_flag=True, help="Build the scene and plan the blocks, but render none.")
 @json_option
 @workspace_option
-def command(
-    workspace: Workspace,
-    rendering: str,
-    workers: int,
-    max_memory: int | None,
-    with_stats: bool,
-    dask: str | None,
-    dask_workspace: str | None,
-    plan_only: bool,
-    as_json: bool,
-) -> None:
+def command(workspace: Workspace, rendering: str, request: Render, with_stats: bool, as_json: bool) -> None:
     """Render the missing and changed tiles of RENDERING.
 
     You can stop it at any time, even with kill; re-run it to resume. Ctrl-C finishes the current blocks first; a second Ctrl-C releases them
@@ -54,14 +42,15 @@ def command(
     from map3d.jobs.run_settings import RunSettings
 
     with workspace.open_catalogue() as catalogue:
-        settings = RunSettings(workers, max_memory)
+        workers, memory = request.processes, request.max_memory_bytes
+        settings = RunSettings(workers, memory)
         scene = catalogue.rendering(rendering).scene
-        built = build_with_progress(workspace, catalogue, scene, threads=workers, max_memory_bytes=max_memory)
-        if plan_only:
+        built = build_with_progress(workspace, catalogue, scene, threads=workers, max_memory_bytes=memory)
+        if request.plan_only:
             plan = plan_with_progress(Run(workspace, catalogue, rendering, settings))
             print_plan(rendering, plan, as_json)
             return
-        with _dask_pools(workspace, catalogue, settings, dask, dask_workspace) as pools:
+        with _dask_pools(workspace, catalogue, settings, request.dask, request.dask_workspace) as pools:
             result = render_with_progress(Run(workspace, catalogue, rendering, settings, pools))
     if as_json:
         print_json({**asdict(result), "stats": summary(result.stats) if with_stats else None, "build": built})

@@ -7,7 +7,8 @@ from pathlib import Path
 import click
 
 from map3d.catalogue import Workspace
-from map3d.cli.options import Bytes, workspace_option
+from map3d.cli.option_types import Bytes
+from map3d.cli.options import workspace_option
 
 
 @click.command("serve")

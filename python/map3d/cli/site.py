@@ -1,70 +1,39 @@
 """map3d site."""
 
+from dataclasses import replace
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
+from map3d.cli.from_request import request_options
 from map3d.cli.import_reports import left_alone_lines, missing_textures_line, place_line, warning_lines
-from map3d.cli.layer_options import data_option, small_option
-from map3d.cli.options import View, format_options, max_memory_option, outlier_options, style_option, workers_option, workspace_option
+from map3d.cli.options import workspace_option
 from map3d.cli.output import names_text, plural, size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
-from map3d.geometry.views import views_around
-from map3d.types import COLOR_FORMATS, ViewAngles
+from map3d.requests import Site
 
 if TYPE_CHECKING:
     from map3d.renderings.site_files import ImportSummary
-    from map3d.renderings.site_steps import SiteRequest
 
 
 @click.command("site")
-@click.argument("folder", type=click.Path(path_type=Path, exists=True))
-@click.option("-o", "--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Output folder of the site.")
-@click.option("--name", help="Name of scene and rendering.  [default: from the folder]")
-@click.option("--title", help="Display title.  [default: name of the folder]")
-@click.option("--attribution", default="", help="Attribution text.")
-@click.option(
-    "--view",
-    "views",
-    type=View(),
-    multiple=True,
-    help="Look-at angle and pitch, e.g. 45-22.5; repeatable.  [default: 4 angles, pitch 45]",
-)
-@click.option(
-    "--res",
-    "res_m",
-    type=float,
-    help="Metres per pixel.  [default: as fine as textures and triangles, coarser for large scenes, so that rendering takes minutes]",
-)
-@click.option("--color", type=click.Choice(list(COLOR_FORMATS)), default="webp", show_default=True, help="Image format of the layer color.")
-@data_option()
-@small_option
-@click.option("--crs", help="Coordinate system of the files, where they do not state it or state it wrongly; 'local' for local metres.")
-@format_options
-@click.option("--strict", is_flag=True, help="Stop at the first problem instead of skipping it.")
-@click.option("--allow-empty", is_flag=True, help="Remove files from the site even if the folder that they came from is empty now.")
-@outlier_options
-@style_option
-@click.option("--ao/--no-ao", default=None, help="Render ambient occlusion.  [default: where textures cover less than a tenth]")
-@workers_option
-@max_memory_option
+@request_options(Site, folder={"type": click.Path(path_type=Path, exists=True)}, out={"type": click.Path(path_type=Path, file_okay=False)})
 @workspace_option
-def command(
-    workspace: Workspace, folder: Path, out: Path, views: tuple[ViewAngles, ...], workers: int, max_memory: int | None, **options: Any
-) -> None:
+def command(workspace: Workspace, request: Site) -> None:
     """Turn all files in FOLDER into a static web site: import, build, render, publish.
 
     You can stop it at any time; re-run it to resume. Re-run it after files change; only the changes are processed. Files that have left FOLDER leave
     the site; files are imported again when they, the options or the reader change.
     """
     from map3d.cli.site_extents import print_estimate, print_extents, print_rendering
+    from map3d.ingest.sources import asset_name
     from map3d.jobs.run import Run
     from map3d.jobs.run_settings import RunSettings
     from map3d.publish import check_folder
@@ -73,18 +42,20 @@ def command(
     from map3d.renderings.site_steps import create_site_rendering, store_report
     from map3d.renderings.style import choose_style
 
+    out, workers, memory = request.out, request.processes, request.max_memory_bytes
     check_folder(out)
-    settings = RunSettings(workers, max_memory)
+    settings = RunSettings(workers, memory)
     settings.check()
-    request = _site_request(folder, views, **options)
+    folder_name = request.folder.resolve().stem
+    request = replace(request, name=request.name or asset_name(folder_name), title=request.title or folder_name)
     with workspace.create().open_catalogue() as catalogue:
         summary = _update_files(workspace, catalogue, request)
         if not catalogue.assets(request.name):
             click.echo(f"the scene {request.name} has no files left; {out} stays as it was published")
             return
-        choose_content(catalogue, request.name, request.keep_outliers, request.cluster)
-        choose_style(catalogue, request.name, request.style)
-        built = build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=max_memory)
+        choose_content(catalogue, request.name, bool(request.keep_outliers), request.cluster or 0)
+        choose_style(catalogue, request.name, request.style or {"rules": []})
+        built = build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=memory)
         print_extents(workspace, catalogue, request.name, was_built=built is not None)
         made = create_site_rendering(workspace, catalogue, request)
         record = made.record
@@ -102,36 +73,9 @@ def command(
     click.echo(f"report: {out / REPORT_PAGE} says what the files hold and what was skipped")
 
 
-def _site_request(folder: Path, views: tuple[ViewAngles, ...], **options: Any) -> "SiteRequest":
-    from map3d.ingest.import_options import ImportOptions
-    from map3d.ingest.sources import asset_name
-    from map3d.renderings.site_steps import SiteRequest
-
-    folder_name = folder.resolve().stem
-    return SiteRequest(
-        name=options["name"] or asset_name(folder_name),
-        sources=folder,
-        views=views or views_around(4, (45.0,)),
-        res_m=options["res_m"],
-        title=options["title"] or folder_name,
-        attribution=options["attribution"],
-        color=options["color"],
-        data=options["data"],
-        small=options["small"],
-        options=ImportOptions(
-            **{name: options[name] for name in ("crs", "up", "split", "theme", "lod", "interiors", "transparency", "max_error_m", "strict")},
-            virtual_rasters=True,
-        ),
-        allow_empty=options["allow_empty"],
-        keep_outliers=bool(options["keep_outliers"]),
-        cluster=options["cluster"] or 0,
-        style=options["style"] or [],
-        ao=options["ao"],
-    )
-
-
-def _update_files(workspace: Workspace, catalogue: Catalogue, request: "SiteRequest") -> "ImportSummary":
+def _update_files(workspace: Workspace, catalogue: Catalogue, request: Site) -> "ImportSummary":
     from map3d.renderings.site_files import update_files
+    from map3d.renderings.site_steps import site_files
 
     with progress_bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as bar:
         task = bar.add_task("importing", total=None)
@@ -139,7 +83,7 @@ def _update_files(workspace: Workspace, catalogue: Catalogue, request: "SiteRequ
         def report(name: str, done: int, total: int, how_far: str) -> None:
             bar.update(task, description=f"importing {name}: {how_far}" if how_far else f"importing {name}", completed=done, total=total)
 
-        summary = update_files(workspace, catalogue, request.files, report)
+        summary = update_files(workspace, catalogue, site_files(request), report)
     _print_summary(summary)
     _print_problems(workspace, catalogue, request.name)
     return summary

@@ -5,22 +5,21 @@ from dataclasses import asdict
 import click
 
 from map3d.catalogue import Workspace
-from map3d.cli.options import json_option, max_memory_option, workers_option, workspace_option
+from map3d.cli.from_request import request_options
+from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import plural, print_json, size_text
 from map3d.errors import BadRequest
+from map3d.requests.scenes import WorkLimits
 
 
 @click.command("work")
 @click.argument("renderings", nargs=-1)
-@workers_option
-@max_memory_option
+@request_options(WorkLimits)
 @click.option("--operations", is_flag=True, help="Do operations instead: imports, builds, renders … asked for in the web interface or by programs.")
 @click.option("--forever", is_flag=True, help="Wait for more work when nothing is left, until stopped.")
 @json_option
 @workspace_option
-def command(
-    workspace: Workspace, renderings: tuple[str, ...], workers: int, max_memory: int | None, operations: bool, forever: bool, as_json: bool
-) -> None:
+def command(workspace: Workspace, renderings: tuple[str, ...], request: WorkLimits, operations: bool, forever: bool, as_json: bool) -> None:
     """Help to render RENDERINGS, or all renderings with open blocks, until nothing is left.
 
     Joins a map3d render that runs in another process or on another node, and also goes on when that one has ended. The last process to finish
@@ -38,7 +37,7 @@ def command(
     from map3d.jobs.work import Work
 
     with workspace.open_catalogue() as catalogue, RunProgress() as progress:
-        result = Work(workspace, catalogue, RunSettings(workers, max_memory), renderings, forever=forever).run(progress)
+        result = Work(workspace, catalogue, RunSettings(request.processes, request.max_memory_bytes), renderings, forever=forever).run(progress)
     if as_json:
         print_json(asdict(result))
     else:

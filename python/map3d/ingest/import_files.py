@@ -39,13 +39,11 @@ def import_files(
     files: Sequence[Path],
     options: ImportOptions,
     *,
-    name: str | None = None,
-    skip_unchanged: bool = False,
     progress: OnFile | None = None,
 ) -> FilesImport:
     """Imports the files, and all files in known formats of the folders and ZIP archives.
 
-    `name`: of the only asset; `skip_unchanged`: leaves assets alone whose files, options and reader are the same as at their import.
+    `options.skip_unchanged`: leaves assets alone whose files, options and reader are the same as at their import.
 
     Raises NotFound, UnknownFormat, BadRequest; ImportFailed and LimitExceeded for an archive that cannot be unpacked; under `options.strict` and for
     a single file also the errors of `import_file`.
@@ -54,7 +52,7 @@ def import_files(
     with unpacked(workspace, scene, files, progress or (lambda *_: None)) as found:
         archives = {folder for folder, _ in found.archives}
         virtual = [path for path in found.paths if options.virtual_rasters and path not in archives]
-        done = _import_files(workspace, catalogue, scene, found.paths, virtual, options, name, skip_unchanged, progress)
+        done = _import_files(workspace, catalogue, scene, found.paths, virtual, options, progress)
         failed = [(found.original(path), found.original(reason)) for path, reason in done.failed]
         left_alone = [(found.original(path), found.original(reason)) for path, reason in done.left_alone]
         return FilesImport(done.imported, done.unchanged, failed, left_alone)
@@ -67,15 +65,13 @@ def _import_files(
     files: Sequence[Path],
     virtual: Sequence[Path],
     options: ImportOptions,
-    name: str | None,
-    skip_unchanged: bool,
     progress: OnFile | None,
 ) -> FilesImport:
     result = FilesImport()
     assets = catalogue.assets(scene)
     sources = find_sources(
         files,
-        name,
+        options.name,
         lambda path, reason: result.failed.append((str(path), reason)),
         lambda path, reason: result.left_alone.append((str(path), reason)),
         {asset.name: Path(asset.source) for asset in assets},
@@ -85,10 +81,10 @@ def _import_files(
     )
     if result.failed and options.strict:
         raise UnknownFormat(result.failed[0][1])
-    if name is not None and len(sources) > 1:
-        raise BadRequest(f"--name {name}: applies to a single file, got {len(sources)}")
+    if options.name is not None and len(sources) > 1:
+        raise BadRequest(f"--name {options.name}: applies to a single file, got {len(sources)}")
     is_single = len(sources) + len(result.failed) == 1
-    known = _known_assets(workspace, catalogue, scene) if skip_unchanged else {}
+    known = _known_assets(workspace, catalogue, scene) if options.skip_unchanged else {}
     grids = ReliefGrids()
     waiting, number = list(sources), 0
     with ParserProcess() as parser:

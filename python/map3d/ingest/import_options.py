@@ -1,11 +1,12 @@
 """Options of an import and the limits of the subprocess that parses; the user can raise each limit."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
 from map3d.ingest.gzip_file import content_bytes
+from map3d.requests.reading import AddFiles, FormatOptions
 from map3d.subprocess import Limits
 
 GIB: Final = 1 << 30
@@ -16,27 +17,18 @@ CPU_S_PER_BIG_RASTER: Final = 600
 OPEN_FILES: Final = 256
 
 
-@dataclass(frozen=True)
-class ImportOptions:
-    """`crs`: overrides the CRS that the file names, or supplies a missing one; "local" for plain metres. `up`, `split`: OBJ only.
-    `theme`, `lod`, `interiors` (draws rooms): CityGML only. `transparency` of materials: "as-is", "inverted" (it is opacity), or "auto"
-    (decided for each file). `max_error_m`: greatest height error of the triangles of an elevation model, 0 keeps every height.
-    A limit of None means its default. `virtual_rasters`: reads virtual rasters (VRT), which name other files; only for paths that the operator of
-    this host gave."""
+@dataclass(frozen=True, kw_only=True)
+class ImportOptions(AddFiles):
+    """The request, and what only this host's programs decide. `virtual_rasters`: reads virtual rasters (VRT), which name other files; only for paths
+    that the operator of this host gave."""
 
-    crs: str | None = None
-    up: str = "z"
-    split: str = "file"
-    theme: str | None = None
-    lod: str | None = None
-    transparency: str = "auto"
-    max_error_m: float = 0.0
-    strict: bool = False
-    name: str | None = None
-    parse_memory_bytes: int | None = None
-    parse_cpu_s: int | None = None
-    interiors: bool = False
     virtual_rasters: bool = False
+
+    @classmethod
+    def of(cls, request: FormatOptions, **more: Any) -> "ImportOptions":
+        """Returns the options that a request has, and `more`."""
+        names = [one.name for one in fields(cls) if hasattr(request, one.name)]
+        return cls(**{**{name: getattr(request, name) for name in names}, **more})
 
     def reader_options(self, format: str, limits: Limits) -> dict[str, Any]:
         """Returns the options of the core's Reader."""

@@ -1,6 +1,5 @@
 """A rendering of the library."""
 
-from collections.abc import Sequence
 from datetime import date, datetime
 from os import PathLike
 from typing import Any
@@ -19,10 +18,9 @@ from map3d.publish import Published, publish
 from map3d.renderings.build import build_if_stale
 from map3d.renderings.cost_estimate import RenderingEstimate, estimate
 from map3d.renderings.create import add_layers, add_views
-from map3d.renderings.layers import LayerRequest, choose_layers
 from map3d.renderings.remove_rendering import find_rendering, remove_rendering
-from map3d.renderings.sun_layers import LightRequest
-from map3d.types import DataEncoding, ViewAngles
+from map3d.requests import AddLayers
+from map3d.types import ViewAngles
 
 
 class LibraryRendering:
@@ -40,9 +38,9 @@ class LibraryRendering:
     def scene_name(self) -> str:
         return self.record.scene
 
-    def estimate(self, *, workers: int | None = None, progress: OnProgress | None = None) -> RenderingEstimate:
+    def estimate(self, *, workers: int | None = None, max_memory_bytes: int | None = None, progress: OnProgress | None = None) -> RenderingEstimate:
         """Builds the scene if its files have changed, and estimates tiles, bytes and seconds before they are rendered."""
-        self._build(workers, None, progress)
+        self._build(workers, max_memory_bytes, progress)
         return estimate(self._workspace, self._catalogue, self.name, workers or usable_cores())
 
     def render(
@@ -79,10 +77,22 @@ class LibraryRendering:
         """Adds views, as (look-at angle, pitch); `render` renders them. Raises BadRequest, OutsideFrame."""
         add_views(self._catalogue, self.name, [ViewAngles(*view) for view in views])
 
-    def add_layers(self, *layers: str, **options: Any) -> None:
-        """Adds layers, each as KIND or NAME=KIND, to all views; `render` renders them. `options`: color (webp, jpeg, png), quality, small; time, sun
-        (azimuth, elevation), day, radius_m and place (latitude, longitude) for layers with light. Raises BadRequest, AlreadyExists."""
-        add_layers(self._catalogue, self.name, layer_request(layers, **options))
+    def add_layers(
+        self,
+        *layers: str,
+        color: str = "webp",
+        quality: int = 80,
+        small: bool = False,
+        time: datetime | None = None,
+        sun: tuple[float, float] | None = None,
+        day: date | None = None,
+        radius_m: float | None = None,
+        place: tuple[float, float] | None = None,
+    ) -> None:
+        """Adds layers, each as KIND or NAME=KIND, to all views; `render` renders them. `sun`: azimuth and elevation; `place`: latitude and longitude.
+        Raises BadRequest, AlreadyExists."""
+        details: dict[str, Any] = {"color": color, "quality": quality, "small": small, "time": time, "day": day, "radius_m": radius_m}
+        add_layers(self._catalogue, self.name, AddLayers(layers=layers, **details, **light_of(sun, place)))
 
     def publish(
         self,
@@ -92,13 +102,12 @@ class LibraryRendering:
         allow_incomplete: bool = False,
         dry_run: bool = False,
         url: str | None = None,
+        gis: bool = False,
         progress: OnProgress | None = None,
     ) -> Published:
         """Writes a folder for any static web host, or sends it to the URL of an object store. Raises AlreadyExists, BadRequest (incomplete)."""
-        show, target = publishing(progress), str(out)
-        return publish(
-            self._workspace, self.name, target, replace=replace, allow_incomplete=allow_incomplete, dry_run=dry_run, url=url, progress=show
-        )
+        how: dict[str, Any] = {"replace": replace, "allow_incomplete": allow_incomplete, "dry_run": dry_run, "url": url, "gis": gis}
+        return publish(self._workspace, self.name, str(out), progress=publishing(progress), **how)
 
     def remove(self) -> None:
         """Removes the rendering with its tiles. Raises BadRequest while it is being rendered."""
@@ -113,23 +122,8 @@ class LibraryRendering:
         return f"<map3d rendering {self.name!r}>"
 
 
-def layer_request(
-    layers: Sequence[str] | None = None,
-    *,
-    data: DataEncoding | None = None,
-    color: str = "webp",
-    quality: int = 80,
-    small: bool = False,
-    time: datetime | None = None,
-    sun: tuple[float, float] | None = None,
-    day: date | None = None,
-    radius_m: float | None = None,
-    place: tuple[float, float] | None = None,
-) -> LayerRequest:
-    angles = None if sun is None else SunAngles(*sun)
-    position = None if place is None else GeographicPosition(*place)
-    light = LightRequest(time=time, sun=angles, day=day, radius_m=radius_m, place=position)
-    return LayerRequest(tuple(choose_layers(layers, data)), color, quality, light, small)
+def light_of(sun: tuple[float, float] | None, place: tuple[float, float] | None) -> dict[str, Any]:
+    return {"sun": None if sun is None else SunAngles(*sun), "place": None if place is None else GeographicPosition(*place)}
 
 
 def _show(progress: OnProgress | None, stage: str, done: int, total: int) -> None:

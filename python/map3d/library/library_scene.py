@@ -1,24 +1,25 @@
 """A scene of the library."""
 
 from collections.abc import Mapping, Sequence
+from datetime import date, datetime
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
-from map3d.errors import BadRequest
-from map3d.geometry.views import DEFAULT_PITCH_DEG, parse_view, views_around
+from map3d.geometry.views import parse_view
 from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.jobs.dead_workers import expire_dead_workers
-from map3d.library.library_rendering import LibraryRendering, layer_request
+from map3d.library.library_rendering import LibraryRendering, light_of
 from map3d.library.on_progress import OnProgress, building
 from map3d.renderings.build import build_if_stale
-from map3d.renderings.create import RenderingRequest, create_rendering
+from map3d.renderings.create import check_rendering, create_rendering
 from map3d.renderings.outliers import Outliers, choose_content, read_outliers
 from map3d.renderings.remove_files import find_files, is_built, remove_files
 from map3d.renderings.remove_scene import find_scene, remove_scene
-from map3d.renderings.style import check_style, choose_style
+from map3d.renderings.style import choose_style
+from map3d.requests import CreateRendering
 from map3d.types import DataEncoding, ViewAngles
 
 View = tuple[float, float] | str
@@ -69,14 +70,29 @@ class LibraryScene:
 
         Raises NotFound, UnknownFormat, BadRequest; for a single file, and with `strict`, also ImportFailed, LimitExceeded, CrsError.
         """
-        options = ImportOptions(crs, up, split, theme, lod, transparency, max_error_m, strict, None, parse_memory_bytes, parse_cpu_s, interiors, True)
+        options = ImportOptions(
+            crs=crs,
+            name=name,
+            up=up,
+            split=split,
+            theme=theme,
+            lod=lod,
+            interiors=interiors,
+            transparency=transparency,
+            max_error_m=max_error_m,
+            strict=strict,
+            parse_memory_bytes=parse_memory_bytes,
+            parse_cpu_s=parse_cpu_s,
+            skip_unchanged=skip_unchanged,
+            virtual_rasters=True,
+        )
 
         def show(file: str, number: int, total: int, how_far: str) -> None:
             if progress is not None:
                 progress(f"importing {file}" + (f": {how_far}" if how_far else ""), number, total)
 
         paths = [Path(file) for file in files]
-        return import_files(self._workspace, self._catalogue, self.name, paths, options, name=name, skip_unchanged=skip_unchanged, progress=show)
+        return import_files(self._workspace, self._catalogue, self.name, paths, options, progress=show)
 
     @property
     def outliers(self) -> Outliers:
@@ -107,7 +123,7 @@ class LibraryScene:
         is from the rest; `cluster`: number of the place to build, of several far from each other, 0 for the largest; `style`: colours of surfaces
         that have none, as in a style file; None leaves these choices as they are. Raises BadRequest for a scene without files, LimitExceeded."""
         choose_content(self._catalogue, self.name, keep_outliers, cluster)
-        choose_style(self._catalogue, self.name, None if style is None else check_style(style))
+        choose_style(self._catalogue, self.name, style)
         show, threads = building(progress), workers
         return build_if_stale(self._workspace, self._catalogue, self.name, threads=threads, max_memory_bytes=max_memory_bytes, progress=show)
 
@@ -117,7 +133,7 @@ class LibraryScene:
         *,
         views: Sequence[View] | None = None,
         directions: int | None = None,
-        pitch: float = DEFAULT_PITCH_DEG,
+        pitch: float | Sequence[float] = (),
         res_m: float | None = None,
         levels: int | None = None,
         layers: Sequence[str] | None = None,
@@ -129,21 +145,47 @@ class LibraryScene:
         tiles: str | None = None,
         regrid: bool = False,
         progress: OnProgress | None = None,
-        **layer_options: Any,
+        color: str = "webp",
+        quality: int = 80,
+        small: bool = False,
+        time: datetime | None = None,
+        sun: tuple[float, float] | None = None,
+        day: date | None = None,
+        radius_m: float | None = None,
+        place: tuple[float, float] | None = None,
     ) -> LibraryRendering:
         """Builds the scene if its files have changed, and creates a rendering of it. `views`, or `directions` evenly spaced look-at angles (4 by
-        default) at `pitch`; `res_m` metres per pixel, or a number of `levels`. `layers`: each KIND or NAME=KIND; without them, color with normal, id
-        and depth, as PNG layers for the `data` "png", as one layer of data tiles for "tile". `layer_options`: color, quality, small, time, sun, day,
-        radius_m, place (`LibraryRendering.add_layers`). The others are those of `map3d create-rendering`.
+        default) at each `pitch` (45); `res_m` metres per pixel, or a number of `levels`. `layers`: each KIND or NAME=KIND; without them, color with
+        normal, id and depth, as PNG layers for the `data` "png", as one layer of data tiles for "tile". `sun`: azimuth and elevation; `place`:
+        latitude and longitude. The others are those of `map3d create-rendering`.
 
         Raises AlreadyExists, BadName, BadRequest.
         """
-        if views is not None and directions is not None:
-            raise BadRequest(f"rendering {name}: give either views or directions")
-        angles = views_around(directions or 4, [pitch]) if views is None else [view_angles(view) for view in views]
-        chosen = layer_request(layers, data=data, **layer_options)
-        request = RenderingRequest(self.name, name, angles, res_m, levels, chosen, tile_px, title, attribution, regrid, window, tiles)
-        request.check(self._catalogue)
+        request = CreateRendering(
+            scene=self.name,
+            name=name,
+            views=() if views is None else tuple(view_angles(view) for view in views),
+            directions=directions,
+            pitch=tuple(pitch) if isinstance(pitch, Sequence) else (pitch,),
+            res_m=res_m,
+            levels=levels,
+            window=window,
+            layers=None if layers is None else tuple(layers),
+            data=data,
+            tile_px=tile_px,
+            title=title,
+            attribution=attribution,
+            tiles=tiles,
+            regrid=regrid,
+            color=color,
+            quality=quality,
+            small=small,
+            time=time,
+            day=day,
+            radius_m=radius_m,
+            **light_of(sun, place),
+        )
+        check_rendering(self._catalogue, request)
         self.build(progress=progress)
         record = create_rendering(self._workspace, self._catalogue, request)
         return LibraryRendering(self._workspace, self._catalogue, record.name)

@@ -1,14 +1,16 @@
 """A workspace of the library."""
 
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.library.library_rendering import LibraryRendering
 from map3d.library.library_scene import LibraryScene
-from map3d.renderings.create_scene import SceneRequest, create_scene
+from map3d.renderings.create_scene import create_scene
+from map3d.requests import CreateScene
 
 
 def open_workspace(folder: str | PathLike[str], *, catalogue: str | None = None, create: bool = True) -> "LibraryWorkspace":
@@ -42,14 +44,37 @@ class LibraryWorkspace:
         attribution: str = "",
         ground_plane: str = "auto",
         files: str | None = None,
-        **build_options: bool,
+        keep_outliers: bool | None = None,
+        cluster: int | None = None,
+        style: Mapping[str, Any] | None = None,
+        merge_vertices: bool = True,
+        merge_faces: bool = True,
+        drop_degenerate: bool = True,
+        merge_materials: bool = True,
+        drop_untextured: bool = False,
     ) -> LibraryScene:
         """Creates an empty scene. `crs`: such as EPSG:25832, or "local"; by default that of the first file. `files`: URL at which the built scene is
-        shared with other nodes. `build_options`: merge_vertices, merge_faces, drop_degenerate, merge_materials, drop_untextured.
+        shared with other nodes. `keep_outliers`, `cluster`, `style`: as for `LibraryScene.build`. The others are steps of the build.
 
         Raises AlreadyExists, BadName, CrsError, BadRequest.
         """
-        create_scene(self._workspace, self._catalogue, SceneRequest(name, title, attribution, crs, ground_plane, files, build_options))
+        request = CreateScene(
+            name=name,
+            crs=crs,
+            title=title,
+            attribution=attribution,
+            ground_plane=ground_plane,
+            files=files,
+            keep_outliers=keep_outliers,
+            cluster=cluster,
+            style=style,
+            merge_vertices=merge_vertices,
+            merge_faces=merge_faces,
+            drop_degenerate=drop_degenerate,
+            merge_materials=merge_materials,
+            drop_untextured=drop_untextured,
+        )
+        create_scene(self._workspace, self._catalogue, request)
         return LibraryScene(self._workspace, self._catalogue, name)
 
     def scene(self, name: str) -> LibraryScene:

@@ -5,36 +5,11 @@ from functools import cache
 from typing import Any, Final
 
 from map3d.errors import BadRequest
-from map3d.publish.published_folders import FOLDER_NAME
+from map3d.requests import AddFiles, Build, Publish, RemoveScene, Render
+from map3d.requests.json_values import schemas_of
+from map3d.requests.publications import FOLDER_NAME
 
-_WORKERS: Final = {"type": "integer", "minimum": 1, "maximum": 512, "description": "Number of parallel processes; one per core by default."}
-_MEMORY: Final = {"type": "integer", "minimum": 1, "description": "Memory limit in bytes for all processes together."}
-_IMPORT_OPTIONS: Final = {
-    "type": "object",
-    "additionalProperties": False,
-    "properties": {
-        "crs": {"type": "string", "description": "Coordinate system of the files, where they do not state it or state it wrongly."},
-        "name": {"type": "string", "description": "Name of the asset, for a single file."},
-        "up": {"type": "string", "enum": ["y", "z"], "description": "OBJ: the axis that points up."},
-        "split": {"type": "string", "enum": ["file", "group"], "description": "OBJ: the part that becomes one object."},
-        "theme": {"type": "string", "description": "CityGML: the appearance theme to use."},
-        "lod": {"type": "string", "description": "CityGML: the level of detail to use."},
-        "interiors": {"type": "boolean", "description": "CityGML: draw rooms and what is in them."},
-        "transparency": {
-            "type": "string",
-            "enum": ["auto", "as-is", "inverted"],
-            "description": "How transparency of materials is read; inverted: it is opacity.",
-        },
-        "max_error_m": {
-            "type": "number",
-            "minimum": 0,
-            "description": "Elevation models: greatest height error of the triangles; 0 keeps every height.",
-        },
-        "strict": {"type": "boolean", "description": "Stop at the first problem instead of skipping and counting it."},
-        "parse_memory_bytes": {"type": "integer", "minimum": 1, "description": "Memory limit for reading a file."},
-        "parse_cpu_s": {"type": "integer", "minimum": 1, "description": "Limit in CPU seconds for reading a file."},
-    },
-}
+_WITH_RENDERINGS: Final = schemas_of(RemoveScene)["with_renderings"]
 _NAMES: Final = {"type": "array", "items": {"type": "string"}, "minItems": 1}
 
 ARGUMENTS: Final[Mapping[str, Mapping[str, Any]]] = {
@@ -46,54 +21,26 @@ ARGUMENTS: Final[Mapping[str, Mapping[str, Any]]] = {
         "properties": {
             "files": {**_NAMES, "description": "Ids of complete uploads; ZIP archives are unpacked."},
             "paths": {**_NAMES, "description": "Files and folders of the server's host."},
-            "options": _IMPORT_OPTIONS,
+            "options": {"type": "object", "additionalProperties": False, "properties": schemas_of(AddFiles)},
         },
     },
     "build": {
         "type": "object",
         "additionalProperties": False,
         "description": "Builds the scene if its files, or what it keeps of them, have changed.",
-        "properties": {
-            "workers": _WORKERS,
-            "max_memory_bytes": _MEMORY,
-            "keep_outliers": {"type": "boolean", "description": "Keep content however far it is from the rest."},
-            "cluster": {
-                "type": "integer",
-                "minimum": 0,
-                "description": "Of files in places far from each other, the number of the place to build; 0 is the largest.",
-            },
-            "style": {
-                "type": "object",
-                "additionalProperties": False,
-                "required": ["rules"],
-                "description": "Colours of surfaces to which the files give none, as in a style file.",
-                "properties": {"rules": {"type": "array", "maxItems": 1000, "items": {"type": "object"}}},
-            },
-        },
+        "properties": schemas_of(Build),
     },
     "render": {
         "type": "object",
         "additionalProperties": False,
         "description": "Builds the scene if its files have changed, then renders the missing and changed tiles.",
-        "properties": {
-            "workers": _WORKERS,
-            "max_memory_bytes": _MEMORY,
-            "retry_quarantined": {"type": "boolean", "description": "Renders the blocks in quarantine once more."},
-        },
+        "properties": schemas_of(Render),
     },
     "publish": {
         "type": "object",
         "additionalProperties": False,
         "description": "Writes the rendering as static files, or updates them.",
-        "properties": {
-            "folder": {
-                "type": "string",
-                "pattern": FOLDER_NAME,
-                "description": "Name of the folder in the workspace's folder published/; by default that of the rendering.",
-            },
-            "url": {"type": "string", "description": "Address of the map's page, which links to it need to show its picture."},
-            "allow_incomplete": {"type": "boolean", "description": "Publish even if blocks are missing."},
-        },
+        "properties": schemas_of(Publish),
     },
     "remove": {
         "type": "object",
@@ -108,7 +55,7 @@ ARGUMENTS: Final[Mapping[str, Mapping[str, Any]]] = {
                 "pattern": FOLDER_NAME,
                 "description": "published: name of the folder in the workspace's folder published/.",
             },
-            "with_renderings": {"type": "boolean", "description": "scene: removes its renderings too."},
+            "with_renderings": {**_WITH_RENDERINGS, "description": f"scene: {_WITH_RENDERINGS['description']}"},
             "folders": {
                 "type": "array",
                 "items": {"type": "string", "pattern": FOLDER_NAME},

@@ -1,6 +1,6 @@
 """Does the operations import and build."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, Final
 
 from map3d.catalogue import Catalogue, OperationRecord, Workspace
@@ -13,7 +13,10 @@ from map3d.operations.uploaded_files import check_host_path, remove_staging, sta
 from map3d.quantities import plural
 from map3d.renderings import build
 from map3d.renderings.outliers import choose_content
-from map3d.renderings.style import check_style, choose_style
+from map3d.renderings.style import choose_style
+from map3d.requests import AddFiles, Build
+from map3d.requests.json_values import from_json
+from map3d.requests.scenes import WorkLimits
 
 MAX_LINES: Final = 200
 
@@ -22,8 +25,7 @@ def do_import(workspace: Workspace, catalogue: Catalogue, operation: OperationRe
     """Imports the files; assets that are up to date stay, so that a repeated operation goes on where the first one ended. The worker removes the
     uploads once the operation is done. Raises ImportFailed when a file is broken, after importing the others."""
     arguments = operation.arguments
-    uploads, options = list(arguments.get("files", ())), dict(arguments.get("options", {}))
-    name = options.pop("name", None)
+    uploads, request = list(arguments.get("files", ())), from_json(AddFiles, arguments.get("options", {}), skip_unchanged=True)
     paths = [check_host_path(path) for path in arguments.get("paths", ())]
     try:
         if uploads:
@@ -31,9 +33,9 @@ def do_import(workspace: Workspace, catalogue: Catalogue, operation: OperationRe
             folder = stage(
                 workspace, operation.id, uploads, operation.asked_by, lambda file, done, total: report.progress(f"unpacking {file}", done, total)
             )
-            paths += [folder] if name is None else sorted(folder.iterdir())
+            paths += [folder] if request.name is None else sorted(folder.iterdir())
         show = _show(report)
-        done = import_files(workspace, catalogue, operation.target, paths, ImportOptions(**options), name=name, skip_unchanged=True, progress=show)
+        done = import_files(workspace, catalogue, operation.target, paths, ImportOptions.of(request), progress=show)
     finally:
         remove_staging(workspace, operation.id)
     _log(report, done)
@@ -66,21 +68,21 @@ def _import_lines(item: Imported) -> Iterator[str]:
 
 
 def do_build(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
-    choose_content(catalogue, operation.target, operation.arguments.get("keep_outliers"), operation.arguments.get("cluster"))
-    style = operation.arguments.get("style")
-    choose_style(catalogue, operation.target, None if style is None else check_style(style))
-    is_built = build_if_stale(workspace, catalogue, operation.target, operation.arguments, report)
+    request = from_json(Build, operation.arguments)
+    choose_content(catalogue, operation.target, request.keep_outliers, request.cluster)
+    choose_style(catalogue, operation.target, request.style)
+    is_built = build_if_stale(workspace, catalogue, operation.target, request, report)
     return f"built scene {operation.target}" if is_built else f"scene {operation.target} is up to date"
 
 
-def build_if_stale(workspace: Workspace, catalogue: Catalogue, scene: str, arguments: Mapping[str, Any], report: OperationReport) -> bool:
+def build_if_stale(workspace: Workspace, catalogue: Catalogue, scene: str, limits: WorkLimits, report: OperationReport) -> bool:
     """Builds the scene if its files have changed; returns whether it did."""
 
     def progress(stage: str, done: int, total: int) -> bool:
         report.progress(f"building: {stage}", done, total)
         return True
 
-    threads, memory = arguments.get("workers"), arguments.get("max_memory_bytes")
+    threads, memory = limits.workers, limits.max_memory_bytes
     counts = build.build_if_stale(workspace, catalogue, scene, threads=threads, max_memory_bytes=memory, progress=progress)
     if counts is None:
         return False

@@ -12,6 +12,7 @@ from map3d.quantities import names_text, plural
 from map3d.renderings.remove_files import find_files, is_built, remove_files
 from map3d.renderings.remove_rendering import find_rendering, remove_rendering
 from map3d.renderings.remove_scene import find_scene, remove_scene
+from map3d.requests.scenes import WorkLimits
 
 
 def do_removal(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
@@ -64,7 +65,7 @@ def _remove_files(workspace: Workspace, catalogue: Catalogue, operation: Operati
     found = find_files(workspace, catalogue, scene, [name for name in operation.arguments["names"] if name in present])
     remove_files(workspace, catalogue, found)
     if is_built(workspace, catalogue, scene):
-        build_if_stale(workspace, catalogue, scene, {}, report)
+        build_if_stale(workspace, catalogue, scene, WorkLimits(), report)
     return f"removed {plural(len(operation.arguments['names']), 'file')} from scene {scene}"
 
 

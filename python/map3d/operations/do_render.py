@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from map3d.catalogue import Catalogue, OperationRecord, Workspace
-from map3d.cores import usable_cores
 from map3d.errors import BadRequest
 from map3d.jobs import events
 from map3d.jobs.event_messages import problem_text
@@ -16,15 +15,17 @@ from map3d.operations.operation_report import OperationReport
 from map3d.publish import publish
 from map3d.publish.published_folders import FOLDER, published_path
 from map3d.quantities import plural
+from map3d.requests import Publish, Render
+from map3d.requests.json_values import from_json
 
 
 def do_render(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
     """Builds, plans and renders like `map3d render`. Raises BadRequest when blocks are left in quarantine."""
-    name, arguments = operation.target, operation.arguments
-    build_if_stale(workspace, catalogue, catalogue.rendering(name).scene, arguments, report)
-    if arguments.get("retry_quarantined"):
+    name, request = operation.target, from_json(Render, operation.arguments)
+    build_if_stale(workspace, catalogue, catalogue.rendering(name).scene, request, report)
+    if request.retry_quarantined:
         catalogue.retry(name)
-    settings = RunSettings(arguments.get("workers", usable_cores()), arguments.get("max_memory_bytes"))
+    settings = RunSettings(request.processes, request.max_memory_bytes)
     run = Run(workspace, catalogue, name, settings)
     report.progress("planning")
     plan = run.plan(lambda done, total: report.progress("planning", done, total))
@@ -62,14 +63,22 @@ def published_folder(workspace: Workspace, operation: OperationRecord) -> Path:
 
 
 def do_publish(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
-    folder, arguments = published_folder(workspace, operation), operation.arguments
+    folder, request = published_folder(workspace, operation), from_json(Publish, operation.arguments, replace=True)
     folder.parent.mkdir(exist_ok=True)
 
     def progress(stage: str, done: int, total: int) -> bool:
         report.progress("publishing tiles" if stage == "publish" else f"publishing {stage}", done, total)
         return True
 
-    url, allow = arguments.get("url"), arguments.get("allow_incomplete", False)
-    done = publish(workspace, operation.target, folder, replace=True, allow_incomplete=allow, url=url, progress=progress)
+    done = publish(
+        workspace,
+        operation.target,
+        folder,
+        replace=request.replace,
+        allow_incomplete=request.allow_incomplete,
+        url=request.url,
+        gis=request.gis,
+        progress=progress,
+    )
     files, size, shown = plural(done.files, "file"), done.bytes / 1e6, f"{FOLDER}/{folder.name}"
     return f"published to {shown}: {files}, {size:,.1f} MB; {done.written:,} written, {done.removed:,} removed"

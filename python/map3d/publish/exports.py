@@ -14,7 +14,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 from PIL import Image
 
@@ -22,13 +22,12 @@ from map3d.catalogue import Workspace
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped, StoreError
 from map3d.geometry.views import track_id
 from map3d.renderings.track_stores import open_track, read_manifest, rendering_record
+from map3d.requests.publications import ExportFormat
 from map3d.tiles.decode_tile import as_layer, decode_channels, find_layer, layer_names
 from map3d.tiles.manifest import Manifest, ManifestView
 from map3d.tiles.tile_store import TileStore
 from map3d.types import COLOR_KINDS, DATA_TILE_KINDS, FILE_SUFFIXES, Layer, TileId
 
-Format = Literal["mbtiles", "xyz", "dzi"]
-FORMATS: Final[tuple[Format, ...]] = ("mbtiles", "xyz", "dzi")
 TILES_PER_STEP: Final = 256
 _NAMESPACE: Final = "http://schemas.microsoft.com/deepzoom/2008"
 _MBTILES_FORMATS: Final = ("webp", "png", "jpeg")
@@ -76,7 +75,7 @@ class _Source:
 
 
 def export(
-    workspace: Workspace, rendering: str, out: Path, *, to: Format, view: str, layer: str = "color", progress: OnTiles | None = None
+    workspace: Workspace, rendering: str, out: Path, *, to: ExportFormat, view: str, layer: str = "color", progress: OnTiles | None = None
 ) -> Exported:
     """Writes the tiles of a view and layer. `out`: a file for MBTiles and DZI (`NAME.dzi`, with the tiles in `NAME_files`), a folder for XYZ.
 
@@ -283,12 +282,12 @@ class _DziWriter(_FilesWriter):
             rows.append(f'  <DisplayRect MinLevel="{first + z}" MaxLevel="{first + z}">{rect}</DisplayRect>')
         return (
             '<?xml version="1.0" encoding="UTF-8"?>\n'
-            f'<Image xmlns="{_NAMESPACE}" TileSize="{manifest.tile_px}" Overlap="0" Format="{self.source.suffix}">\n'
+            f'<Image xmlns="{_NAMESPACE}" TileSize="{manifest.tile_px}" Overlap="0" ExportFormat="{self.source.suffix}">\n'
             f' <Size Width="{side}" Height="{side}"/>\n <DisplayRects>\n' + "\n".join(rows) + "\n </DisplayRects>\n</Image>\n"
         )
 
 
-_WRITERS: Final[dict[Format, type[_Writer]]] = {"mbtiles": _MbtilesWriter, "xyz": _FilesWriter, "dzi": _DziWriter}
+_WRITERS: Final[dict[ExportFormat, type[_Writer]]] = {"mbtiles": _MbtilesWriter, "xyz": _FilesWriter, "dzi": _DziWriter}
 
 
 def _check_absent(path: Path) -> None:

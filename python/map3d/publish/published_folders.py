@@ -13,10 +13,10 @@ from map3d.errors import BadRequest, Map3dError, NotFound
 from map3d.ingest.asset_removal import remove_folder
 from map3d.publish.folder_target import draft_of, old_of
 from map3d.renderings.removal_checks import folder_bytes
+from map3d.requests.publications import FOLDER_NAME
 from map3d.tiles.manifest import FILE_NAME, Manifest
 
 FOLDER: Final = "published"
-FOLDER_NAME: Final = "^[a-z0-9][a-z0-9_-]{0,63}$"
 
 
 @dataclass(frozen=True)

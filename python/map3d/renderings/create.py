@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import Final
 
 from map3d.catalogue import Catalogue, RenderingRecord, Workspace
@@ -12,54 +12,37 @@ from map3d.geometry.frames import Window, pin, pin_beside
 from map3d.geometry.views import check_angles
 from map3d.renderings.block_limit import check_block_count
 from map3d.renderings.build import is_stale, open_scene
-from map3d.renderings.layers import LayerRequest
+from map3d.renderings.layers import check_layers, make_layers
 from map3d.renderings.remove_rendering import finish_rendering_removal
 from map3d.renderings.track_stores import TILES, check_tiles_url, remove_tracks
+from map3d.requests import AddLayers, CreateRendering
 from map3d.types import Box, ViewAngles, check_name
 
 COARSEST_M: Final = 1e6
 
 
-@dataclass(frozen=True)
-class RenderingRequest:
-    """Exactly one of `res_m` and `levels` is set. `window`: (x, y) of its centre in the scene's CRS and the length of its side, metres."""
-
-    scene: str
-    name: str
-    views: Sequence[ViewAngles]
-    res_m: float | None = None
-    levels: int | None = None
-    layers: LayerRequest = field(default_factory=LayerRequest)
-    tile_px: int = 256
-    title: str = ""
-    attribution: str = ""
-    regrid: bool = False
-    window: tuple[float, float, float] | None = None
-    tiles: str | None = None
-    """URL of the object store for the tiles; None for SQLite files in the workspace, or with `regrid` for the present one."""
-
-    def check(self, catalogue: Catalogue) -> None:
-        """Checks everything that does not depend on the built scene; raises BadRequest, NotFound."""
-        check_name(self.name, "rendering")
-        scene = catalogue.scene(self.scene)
-        for view in self.views:
-            check_angles(view)
-        if self.window is not None:
-            Window(*self.window)
-        if (self.res_m is None) == (self.levels is None):
-            raise BadRequest("missing resolution: give either --res METRES_PER_PIXEL or --levels N")
-        if self.regrid:
-            catalogue.rendering(self.name)
-            if self.tiles is not None:
-                raise BadRequest(f"rendering {self.name}: --tiles cannot change with --regrid; create another rendering instead")
-        else:
-            _check_free(catalogue, self.name)
-        self.layers.check(scene)
-        if self.tiles is not None:
-            check_tiles_url(self.tiles)
+def check_rendering(catalogue: Catalogue, request: CreateRendering) -> None:
+    """Checks everything that does not depend on the built scene; raises BadRequest, NotFound."""
+    check_name(request.name, "rendering")
+    scene = catalogue.scene(request.scene)
+    for view in request.angles():
+        check_angles(view)
+    if request.window is not None:
+        Window(*request.window)
+    if (request.res_m is None) == (request.levels is None):
+        raise BadRequest("missing resolution: give either --res METRES_PER_PIXEL or --levels N")
+    if request.regrid:
+        catalogue.rendering(request.name)
+        if request.tiles is not None:
+            raise BadRequest(f"rendering {request.name}: --tiles cannot change with --regrid; create another rendering instead")
+    else:
+        _check_free(catalogue, request.name)
+    check_layers(request.layer_names(), request, scene)
+    if request.tiles is not None:
+        check_tiles_url(request.tiles)
 
 
-def create_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest) -> RenderingRecord:
+def create_rendering(workspace: Workspace, catalogue: Catalogue, request: CreateRendering) -> RenderingRecord:
     """Pins the frames to the box of the scene, whose build must be up to date. Raises BadRequest, NotFound."""
     record = draft_rendering(workspace, catalogue, request)
     if request.regrid:
@@ -71,16 +54,16 @@ def create_rendering(workspace: Workspace, catalogue: Catalogue, request: Render
     return record
 
 
-def draft_rendering(workspace: Workspace, catalogue: Catalogue, request: RenderingRequest) -> RenderingRecord:
+def draft_rendering(workspace: Workspace, catalogue: Catalogue, request: CreateRendering) -> RenderingRecord:
     """Returns the rendering that `create_rendering` would store. Raises BadRequest, NotFound."""
-    request.check(catalogue)
+    check_rendering(catalogue, request)
     if is_stale(workspace, catalogue, request.scene):
         raise BadRequest(f"scene {request.scene} has changed since its last build; build it first")
     scene = open_scene(workspace, request.scene)
     box = scene.box
     window = _local_window(catalogue, request)
     res_m = choose_res(box, request)
-    frames = tuple(pin(box, request.tile_px, res_m, request.views, window))
+    frames = tuple(pin(box, request.tile_px, res_m, request.angles(), window))
     check_block_count(scene, frames, request.name)
     tiles = catalogue.rendering(request.name).options.get(TILES) if request.regrid else request.tiles
     options = ({} if window is None else {WINDOW: asdict(window)}) | ({} if tiles is None else {TILES: check_tiles_url(tiles)})
@@ -88,7 +71,7 @@ def draft_rendering(workspace: Workspace, catalogue: Catalogue, request: Renderi
         request.name,
         request.scene,
         res_m,
-        (request.layers.layers(catalogue.scene(request.scene), box),),
+        (make_layers(request.layer_names(), request, catalogue.scene(request.scene), box),),
         frames,
         box,
         request.title,
@@ -110,19 +93,19 @@ def add_views(catalogue: Catalogue, name: str, views: Sequence[ViewAngles]) -> R
     return catalogue.add_frames(name, frames)
 
 
-def add_layers(catalogue: Catalogue, name: str, request: LayerRequest) -> RenderingRecord:
+def add_layers(catalogue: Catalogue, name: str, request: AddLayers) -> RenderingRecord:
     """Adds layers to a rendering as a new pass; existing layers do not change.
 
-    Raises NotFound, BadRequest for a name that exists already, and the errors of `LayerRequest.layers`.
+    Raises NotFound, BadRequest for a name that exists already, and the errors of `make_layers`.
     """
     record = catalogue.rendering(name)
     scene = catalogue.scene(record.scene)
-    if duplicates := sorted({layer.name for layer in record.layers} & set(request.check(scene))):
+    if duplicates := sorted({layer.name for layer in record.layers} & set(check_layers(request.layers, request, scene))):
         raise BadRequest(f"rendering {name}: layer {', '.join(duplicates)} exists already; give the new one another name, as NAME=KIND")
-    return catalogue.add_pass(name, request.layers(scene, record.box))
+    return catalogue.add_pass(name, make_layers(request.layers, request, scene, record.box))
 
 
-def choose_res(box: Box, request: RenderingRequest) -> float:
+def choose_res(box: Box, request: CreateRendering) -> float:
     """Returns the requested resolution, or the finest that fits `levels`: rounded up to three digits, exact for a window."""
     if request.res_m is not None:
         return request.res_m
@@ -134,7 +117,7 @@ def choose_res(box: Box, request: RenderingRequest) -> float:
     return _rounded_up(exact)
 
 
-def _local_window(catalogue: Catalogue, request: RenderingRequest) -> Window | None:
+def _local_window(catalogue: Catalogue, request: CreateRendering) -> Window | None:
     if request.window is None:
         return None
     x_m, y_m, size_m = request.window
@@ -143,12 +126,12 @@ def _local_window(catalogue: Catalogue, request: RenderingRequest) -> Window | N
     return Window(x_m - origin[0], y_m - origin[1], size_m)
 
 
-def _extent_m(box: Box, request: RenderingRequest) -> float:
+def _extent_m(box: Box, request: CreateRendering) -> float:
     """Returns the side of the smallest square that `pin` accepts for all views, by bisection."""
     low, high = 0.0, COARSEST_M
     while high - low > 1e-9 * high:
         middle = (low + high) / 2
-        if pin(box, request.tile_px, middle, request.views)[0].zmax == 0:
+        if pin(box, request.tile_px, middle, request.angles())[0].zmax == 0:
             high = middle
         else:
             low = middle

@@ -1,65 +1,45 @@
 """Creates scenes."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Final
+from dataclasses import fields
+from typing import Any
 
 from map3d.catalogue import Catalogue, SceneCrs, SceneRecord, Workspace
 from map3d.errors import BadRequest
 from map3d.ingest.content import CLUSTER, KEEP_OUTLIERS
 from map3d.ingest.scene_crs import parse_scene_crs
-from map3d.renderings.build import OPTIONS
 from map3d.renderings.remove_scene import finish_scene_removal
 from map3d.renderings.shared_scene import FILES, check_files_url
-from map3d.renderings.style import STYLE, Rules
+from map3d.renderings.style import STYLE, check_style
+from map3d.requests import CreateScene
+from map3d.requests.scenes import GROUND_PLANES, BuildSteps
 from map3d.types import check_name
 
-GROUND_PLANES: Final = ("auto", "on", "off")
+
+def check_scene(request: CreateScene) -> None:
+    """Raises BadName, CrsError, BadRequest."""
+    check_name(request.name, "scene")
+    _build_options(request)
+    _pinned_crs(request)
 
 
-@dataclass(frozen=True)
-class SceneRequest:
-    """`crs`: such as EPSG:25832, "local" for local metres, None for that of the first file; `files`: URL of the store from which other nodes fetch
-    the built scene; `keep_outliers`: keep content however far it is from the rest; `cluster`: the group of content to build, 0 for the largest;
-    `style`: rules of colours; `options`: build options that differ from their default (`build.OPTIONS`)."""
-
-    name: str
-    title: str = ""
-    attribution: str = ""
-    crs: str | None = None
-    ground_plane: str = "auto"
-    files: str | None = None
-    options: Mapping[str, bool] = field(default_factory=dict)
-    keep_outliers: bool = False
-    cluster: int = 0
-    style: Rules = field(default_factory=list)
-
-    def check(self) -> None:
-        """Raises BadName, CrsError, BadRequest."""
-        check_name(self.name, "scene")
-        self.build_options()
-        self.pinned_crs()
-
-    def pinned_crs(self) -> SceneCrs | None:
-        return None if self.crs is None else parse_scene_crs(self.crs)
-
-    def build_options(self) -> dict[str, Any]:
-        """Raises BadRequest for an unknown option."""
-        switches = {name: value for name, value in OPTIONS.items() if isinstance(value, bool)}
-        unknown = sorted(set(self.options) - set(switches))
-        if unknown:
-            raise BadRequest(f"scene {self.name}: unknown build option {', '.join(unknown)}; known are {', '.join(switches)}")
-        if self.ground_plane not in GROUND_PLANES:
-            raise BadRequest(f"scene {self.name}: ground plane is {self.ground_plane!r}, expected {', '.join(GROUND_PLANES)}")
-        shared = {} if self.files is None else {FILES: check_files_url(self.files)}
-        chosen = {name: value for name, value in ((KEEP_OUTLIERS, self.keep_outliers), (CLUSTER, self.cluster), (STYLE, self.style)) if value}
-        return {**switches, **self.options, "ground_plane": self.ground_plane, **chosen, **shared}
-
-
-def create_scene(workspace: Workspace, catalogue: Catalogue, request: SceneRequest) -> SceneRecord:
+def create_scene(workspace: Workspace, catalogue: Catalogue, request: CreateScene) -> SceneRecord:
     """Creates an empty scene. Raises AlreadyExists, BadName, CrsError, BadRequest."""
-    request.check()
+    check_scene(request)
     finish_scene_removal(workspace, catalogue, request.name)
-    options = request.build_options()
-    catalogue.create_scene(SceneRecord(request.name, request.title, request.attribution, crs=request.pinned_crs(), options=options))
+    options = _build_options(request)
+    catalogue.create_scene(SceneRecord(request.name, request.title, request.attribution, crs=_pinned_crs(request), options=options))
     return catalogue.scene(request.name)
+
+
+def _pinned_crs(request: CreateScene) -> SceneCrs | None:
+    return None if request.crs is None else parse_scene_crs(request.crs)
+
+
+def _build_options(request: CreateScene) -> dict[str, Any]:
+    if request.ground_plane not in GROUND_PLANES:
+        raise BadRequest(f"scene {request.name}: ground plane is {request.ground_plane!r}, expected {', '.join(GROUND_PLANES)}")
+    steps = {step.name: getattr(request, step.name) for step in fields(BuildSteps)}
+    shared = {} if request.files is None else {FILES: check_files_url(request.files)}
+    rules = [] if request.style is None else check_style(request.style)
+    chosen = {name: value for name, value in ((KEEP_OUTLIERS, request.keep_outliers), (CLUSTER, request.cluster), (STYLE, rules)) if value}
+    return {**steps, "ground_plane": request.ground_plane, **chosen, **shared}

@@ -13,7 +13,8 @@ from typing import Any, Final
 from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, Workspace, codec
 from map3d.errors import BadRequest, Map3dError, SubprocessDied
 from map3d.renderings.build import is_stale, open_scene
-from map3d.renderings.create import RenderingRequest, draft_rendering
+from map3d.renderings.create import draft_rendering
+from map3d.requests import CreateRendering
 from map3d.subprocess import Failure, Limits, Message, Subprocess
 from map3d.types import Box, Layer, ViewAngles
 
@@ -51,8 +52,8 @@ class PreviewPool:
         request = {"kind": "picture", "view": list(view), "layer": asdict(layer), "res_m": res_m, "at": at}
         return self._ask(self._scene_request(catalogue, scene) | request).blobs[0]
 
-    def estimate(self, catalogue: Catalogue, request: RenderingRequest, workers: int) -> dict[str, Any]:
-        """Returns the fields of RenderingEstimate for a rendering that does not exist yet. Raises like `RenderingRequest.check`, PreviewBusy."""
+    def estimate(self, catalogue: Catalogue, request: CreateRendering, workers: int) -> dict[str, Any]:
+        """Returns the fields of RenderingEstimate for a rendering that does not exist yet. Raises like `check_rendering`, PreviewBusy."""
         record = draft_rendering(self._workspace, catalogue, request)
         asked = {"kind": "estimate", "rendering": _dump(record), "workers": workers}
         return self._ask(self._scene_request(catalogue, request.scene) | asked).value

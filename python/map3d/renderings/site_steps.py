@@ -1,8 +1,7 @@
 """`map3d site`: turns a folder of files into a rendering, in steps that can each be repeated."""
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -15,47 +14,25 @@ from map3d.geometry.frames import check_content, pin
 from map3d.ingest.import_options import ImportOptions
 from map3d.registry import Registry
 from map3d.renderings.build import GROUND, open_scene
-from map3d.renderings.create import RenderingRequest, create_rendering
+from map3d.renderings.create import create_rendering
 from map3d.renderings.file_contents import Finding, file_contents, union
-from map3d.renderings.layers import LayerRequest
 from map3d.renderings.outlier_lines import outlier_lines, place_text
 from map3d.renderings.outliers import read_outliers
 from map3d.renderings.resolution import TERRAIN_CLASSES, Resolution, SurfaceDetail, choose_resolution, surface_detail
 from map3d.renderings.site_files import ImportSummary, SiteFiles
 from map3d.renderings.site_report import SiteReport, read_report, view_names, write_report
-from map3d.renderings.style import Rules
-from map3d.renderings.sun_layers import RADIUS_M, LightRequest
 from map3d.renderings.track_stores import remove_tracks
-from map3d.types import AO_RADIUS_M, DEFAULT_DATA, LAYERS_BY_DATA, DataEncoding, ViewAngles
+from map3d.requests import CreateRendering, Site
+from map3d.requests.renderings import DEFAULT_RADIUS_M
+from map3d.types import AO_RADIUS_M, LAYERS_BY_DATA
 
 AO_RADIUS_SHARE: Final = 0.25
 """Greatest radius of ambient occlusion as a share of the scene's longest side."""
 
 
-@dataclass(frozen=True)
-class SiteRequest:
-    """`choose_resolution` selects the resolution when `res_m` is None. `cluster`: the group of content to keep, 0 for the largest.
-    `small`: encodes for size. `style`: rules of colours. `ao`: ambient occlusion; None for scenes with few textures."""
-
-    name: str
-    sources: Path
-    views: Sequence[ViewAngles]
-    res_m: float | None = None
-    title: str = ""
-    attribution: str = ""
-    color: str = "webp"
-    data: DataEncoding = DEFAULT_DATA
-    small: bool = False
-    options: ImportOptions = field(default_factory=ImportOptions)
-    allow_empty: bool = False
-    keep_outliers: bool = False
-    cluster: int = 0
-    style: Rules = field(default_factory=list)
-    ao: bool | None = None
-
-    @property
-    def files(self) -> SiteFiles:
-        return SiteFiles(SceneRecord(self.name, self.title, self.attribution), self.sources, self.options, self.allow_empty)
+def site_files(request: Site) -> SiteFiles:
+    options = ImportOptions.of(request, name=None, virtual_rasters=True)
+    return SiteFiles(SceneRecord(request.name, request.title, request.attribution), request.folder, options, request.allow_empty)
 
 
 @dataclass(frozen=True)
@@ -69,21 +46,28 @@ class SiteRendering:
     has_chosen_ao: bool = False
 
 
-def create_site_rendering(workspace: Workspace, catalogue: Catalogue, request: SiteRequest) -> SiteRendering:
+def create_site_rendering(workspace: Workspace, catalogue: Catalogue, request: Site) -> SiteRendering:
     """Creates the rendering of the site unless it exists, and replaces its frames when they no longer hold the content; its scene must be built."""
     for record in catalogue.renderings(request.name):
         if record.name == request.name:
             return _refit(workspace, catalogue, request, record)
     scene = open_scene(workspace, request.name)
     detail = _surface_detail(workspace, request.name, scene)
-    resolution = None if request.res_m else choose_resolution(scene, list(request.views), detail)
+    resolution = None if request.res_m else choose_resolution(scene, list(request.angles()), detail)
     res_m = request.res_m if resolution is None else resolution.res_m
     has_chosen_ao = request.ao is None and detail is not None and detail.texel_m is None
     names = LAYERS_BY_DATA[request.data] + (("ao",) if request.ao or has_chosen_ao else ())
-    light = LightRequest(radius_m=_ao_radius_m(scene) if "ao" in names else None)
-    layers = LayerRequest(names, color=request.color, light=light, small=request.small)
-    rendering = RenderingRequest(
-        request.name, request.name, request.views, res_m, layers=layers, title=request.title, attribution=request.attribution
+    rendering = CreateRendering(
+        scene=request.name,
+        name=request.name,
+        views=request.angles(),
+        res_m=res_m,
+        layers=names,
+        color=request.color,
+        small=request.small,
+        radius_m=_ao_radius_m(scene) if "ao" in names else None,
+        title=request.title,
+        attribution=request.attribution,
     )
     return SiteRendering(create_rendering(workspace, catalogue, rendering), resolution, has_chosen_ao=has_chosen_ao)
 
@@ -92,13 +76,13 @@ def _ao_radius_m(scene: _core.Scene) -> float:
     """Returns the radius of ambient occlusion: a smaller one for single buildings and finds, which would be dark all over."""
     lo, hi = scene.box
     longest_m = max(high - low for low, high in zip(lo, hi, strict=True))
-    return max(min(RADIUS_M, AO_RADIUS_SHARE * longest_m), AO_RADIUS_M[0])
+    return max(min(DEFAULT_RADIUS_M, AO_RADIUS_SHARE * longest_m), AO_RADIUS_M[0])
 
 
 def store_report(
     workspace: Workspace,
     catalogue: Catalogue,
-    request: SiteRequest,
+    request: Site,
     made: SiteRendering,
     summary: ImportSummary,
     workers: int,
@@ -108,7 +92,7 @@ def store_report(
     scene, record = catalogue.scene(request.name), made.record
     files = tuple(file_contents(workspace, catalogue, request.name))
     box = union([file.box for file in files])
-    folder = request.sources
+    folder = request.folder
     report = SiteReport(
         title=record.title or record.name,
         crs=None if scene.crs is None else scene.crs.name,
@@ -138,7 +122,7 @@ def _without_folder(text: str, folder: Path) -> str:
     return text
 
 
-def _refit(workspace: Workspace, catalogue: Catalogue, request: SiteRequest, record: RenderingRecord) -> SiteRendering:
+def _refit(workspace: Workspace, catalogue: Catalogue, request: Site, record: RenderingRecord) -> SiteRendering:
     """Pins new frames, with the views, layers and resolution of the rendering, when content has left the present ones."""
     box = open_scene(workspace, request.name).box
     try:

@@ -8,6 +8,7 @@ from typing import Any, Final, TypeAlias
 
 from map3d.catalogue import Catalogue
 from map3d.errors import BadRequest
+from map3d.requests.scenes import Style
 
 STYLE: Final = "style"
 SURFACES: Final = ("wall", "roof", "ground", "window", "door", "road", "water", "vegetation", "terrain", "other")
@@ -21,8 +22,8 @@ Rules: TypeAlias = list[dict[str, Any]]
 """As a build takes them: a colour is a list of three bytes, an attribute's value a string."""
 
 
-def read_style(path: Path) -> Rules:
-    """Reads a style file. Raises BadRequest, with the number of the rule that is wrong."""
+def read_style(path: Path) -> dict[str, Any]:
+    """Reads and checks a style file. Raises BadRequest, with the number of the rule that is wrong."""
     try:
         if path.stat().st_size > MAX_BYTES:
             raise BadRequest(f"{path}: a style has at most {MAX_BYTES >> 20} MiB")
@@ -32,9 +33,10 @@ def read_style(path: Path) -> Rules:
     except ValueError as error:
         raise BadRequest(f"{path}: not a JSON file in UTF-8: {error}") from error
     try:
-        return check_style(value)
+        check_style(value)
     except BadRequest as error:
         raise BadRequest(f"{path}: {error}") from None
+    return dict(value)
 
 
 def check_style(value: Any) -> Rules:
@@ -47,9 +49,10 @@ def check_style(value: Any) -> Rules:
     return [_rule(number, rule) for number, rule in enumerate(rules, 1)]
 
 
-def choose_style(catalogue: Catalogue, scene: str, rules: Rules | None) -> None:
-    """Sets the style of the next build of a scene; None leaves it as it is, and without rules colours are the built-in ones."""
+def choose_style(catalogue: Catalogue, scene: str, style: Style | None) -> None:
+    """Sets the style of the next build of a scene; None leaves it as it is; without rules, colours are the built-in ones."""
     record = catalogue.scene(scene)
+    rules = None if style is None else check_style(style)
     if rules is None or rules == record.options.get(STYLE, []):
         return
     options = {name: option for name, option in record.options.items() if name != STYLE}

@@ -2,86 +2,79 @@
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
-from datetime import date, datetime
+from datetime import datetime
 from typing import Final
 
 from map3d.catalogue import SceneRecord
 from map3d.errors import BadRequest
 from map3d.geometry.sun import GeographicPosition, SunAngles, hours_of, sun_angles, time_text
+from map3d.requests.renderings import DEFAULT_RADIUS_M, LayerDetails
 from map3d.types import LAYERS, RADIUS_KINDS, Box, Sun, Vec3
 
 ONE_SUN: Final = tuple(kind for kind, row in LAYERS.items() if row.suns == (1, 1))
 DAY: Final = tuple(kind for kind, row in LAYERS.items() if row.suns[1] > 1)
 """Kinds with the suns of a day."""
-RADIUS_M: Final = 20.0
 
 
-@dataclass(frozen=True)
-class LightRequest:
-    """`time` (with time zone) or `sun` (angles): for the layers sun and picture. `day`: for the layer sun16. `radius_m`: of ambient occlusion, None
-    selects the default. `place`: the position of a scene in local metres, whose y axis points north."""
+def check_light(light: LayerDetails, kinds: Collection[str], scene: SceneRecord) -> None:
+    """Raises BadRequest for missing options and for options that no layer of `kinds` uses."""
+    one, day, radius = (any(kind in kinds for kind in those) for those in (ONE_SUN, DAY, RADIUS_KINDS))
+    if one and (light.time is None) == (light.sun is None):
+        raise BadRequest(f"{_named(ONE_SUN, kinds)}: give the sun either as --time 2026-06-21T15:00+02:00 or as --sun AZIMUTH,ELEVATION")
+    if day and light.day is None:
+        raise BadRequest(f"{_named(DAY, kinds)}: missing day; give it as in --date 2026-06-21")
+    if light.time is not None and light.time.tzinfo is None:
+        raise BadRequest(f"time {light.time.isoformat()}: missing time zone; write e.g. {light.time.isoformat()}+02:00, or Z for UTC")
+    for given, used, option, kind in (
+        (light.time or light.sun, one, "--time and --sun", ONE_SUN),
+        (light.day, day, "--date", DAY),
+        (light.radius_m, radius, "--ao-radius", RADIUS_KINDS),
+    ):
+        if given is not None and not used:
+            raise BadRequest(f"{option}: used only by {' and '.join(kind)}; add such a layer to --layers, or leave the option out")
+    _check_place(light, scene, needed=day or (one and light.sun is None))
+    _check_sun(light)
 
-    time: datetime | None = None
-    sun: SunAngles | None = None
-    day: date | None = None
-    radius_m: float | None = None
-    place: GeographicPosition | None = None
 
-    def check(self, kinds: Collection[str], scene: SceneRecord) -> None:
-        """Raises BadRequest for missing options and for options that no layer of `kinds` uses."""
-        one, day, radius = (any(kind in kinds for kind in those) for those in (ONE_SUN, DAY, RADIUS_KINDS))
-        if one and (self.time is None) == (self.sun is None):
-            raise BadRequest(f"{_named(ONE_SUN, kinds)}: give the sun either as --time 2026-06-21T15:00+02:00 or as --sun AZIMUTH,ELEVATION")
-        if day and self.day is None:
-            raise BadRequest(f"{_named(DAY, kinds)}: missing day; give it as in --date 2026-06-21")
-        if self.time is not None and self.time.tzinfo is None:
-            raise BadRequest(f"time {self.time.isoformat()}: missing time zone; write e.g. {self.time.isoformat()}+02:00, or Z for UTC")
-        for given, used, option, kind in (
-            (self.time or self.sun, one, "--time and --sun", ONE_SUN),
-            (self.day, day, "--date", DAY),
-            (self.radius_m, radius, "--ao-radius", RADIUS_KINDS),
-        ):
-            if given is not None and not used:
-                raise BadRequest(f"{option}: used only by {' and '.join(kind)}; add such a layer to --layers, or leave the option out")
-        self._check_place(scene, needed=day or (one and self.sun is None))
-        self._check_sun()
+def suns_of(light: LayerDetails, kind: str, scene: SceneRecord, box: Box) -> tuple[Sun, ...]:
+    """Returns the suns of a layer of this kind, for the centre of the scene's local box. Raises BadRequest for a sun below the horizon."""
+    if kind not in (*ONE_SUN, *DAY):
+        return ()
+    location = SceneLocation(scene, box, light.place)
+    if kind in DAY:
+        assert light.day is not None, "checked"
+        return tuple(location.sun_at(time) for time in hours_of(location.place, light.day))
+    sun = location.sun(light.sun) if light.sun is not None else location.sun_at(_whole_second(light))
+    if sun.elevation_deg <= 0:
+        raise BadRequest(f"at {sun.time} the sun is {-sun.elevation_deg:.1f} degrees below the horizon; choose another --time")
+    return (sun,)
 
-    def suns(self, kind: str, scene: SceneRecord, box: Box) -> tuple[Sun, ...]:
-        """Returns the suns of a layer of this kind, for the centre of the scene's local box. Raises BadRequest for a sun below the horizon."""
-        if kind not in (*ONE_SUN, *DAY):
-            return ()
-        location = SceneLocation(scene, box, self.place)
-        if kind in DAY:
-            assert self.day is not None, "checked"
-            return tuple(location.sun_at(time) for time in hours_of(location.place, self.day))
-        sun = location.sun(self.sun) if self.sun is not None else location.sun_at(self._whole_second())
-        if sun.elevation_deg <= 0:
-            raise BadRequest(f"at {sun.time} the sun is {-sun.elevation_deg:.1f} degrees below the horizon; choose another --time")
-        return (sun,)
 
-    def radius_of(self, kind: str) -> float | None:
-        return (RADIUS_M if self.radius_m is None else self.radius_m) if kind in RADIUS_KINDS else None
+def radius_of(light: LayerDetails, kind: str) -> float | None:
+    return (DEFAULT_RADIUS_M if light.radius_m is None else light.radius_m) if kind in RADIUS_KINDS else None
 
-    def _whole_second(self) -> datetime:
-        assert self.time is not None, "checked"
-        return self.time.replace(microsecond=0)
 
-    def _check_sun(self) -> None:
-        if self.sun is not None and not (0 <= self.sun.azimuth_deg < 360 and 0 < self.sun.elevation_deg <= 90):
-            raise BadRequest(f"sun {self.sun.azimuth_deg:g}, {self.sun.elevation_deg:g}: expected 0 ≤ azimuth < 360 and 0 < elevation ≤ 90 degrees")
+def _whole_second(light: LayerDetails) -> datetime:
+    assert light.time is not None, "checked"
+    return light.time.replace(microsecond=0)
 
-    def _check_place(self, scene: SceneRecord, needed: bool) -> None:
-        local = scene.crs is None or scene.crs.is_local
-        if self.place is not None:
-            self.place.checked()
-        if self.place is not None and not local:
-            assert scene.crs is not None, "not local"
-            raise BadRequest(f"--place: scene {scene.name} is already located by its coordinate system {scene.crs.name}; leave --place out")
-        if needed and local and self.place is None:
-            raise BadRequest(
-                f"scene {scene.name} is in local metres: give its position as --place LATITUDE,LONGITUDE, or the sun as --sun AZIMUTH,ELEVATION"
-            )
+
+def _check_sun(light: LayerDetails) -> None:
+    if light.sun is not None and not (0 <= light.sun.azimuth_deg < 360 and 0 < light.sun.elevation_deg <= 90):
+        raise BadRequest(f"sun {light.sun.azimuth_deg:g}, {light.sun.elevation_deg:g}: expected 0 ≤ azimuth < 360 and 0 < elevation ≤ 90 degrees")
+
+
+def _check_place(light: LayerDetails, scene: SceneRecord, needed: bool) -> None:
+    local = scene.crs is None or scene.crs.is_local
+    if light.place is not None:
+        light.place.checked()
+    if light.place is not None and not local:
+        assert scene.crs is not None, "not local"
+        raise BadRequest(f"--place: scene {scene.name} is already located by its coordinate system {scene.crs.name}; leave --place out")
+    if needed and local and light.place is None:
+        raise BadRequest(
+            f"scene {scene.name} is in local metres: give its position as --place LATITUDE,LONGITUDE, or the sun as --sun AZIMUTH,ELEVATION"
+        )
 
 
 class SceneLocation:

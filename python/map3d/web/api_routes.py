@@ -1,18 +1,16 @@
 """The REST API (docs/api.md): scenes, files, renderings, jobs and operations as JSON. Long work is an operation, done by another process."""
 
-from datetime import date, datetime
 from threading import Lock
 from typing import Any, Final
 
 from map3d.catalogue import OperationState, State
 from map3d.errors import BadRequest, NotFound, Unavailable
-from map3d.geometry.views import DEFAULT_PITCH_DEG, views_around
-from map3d.library.library_rendering import layer_request
 from map3d.operations.estimating import estimate_apart
 from map3d.operations.request_operation import request_operation
-from map3d.renderings.create import RenderingRequest, create_rendering
-from map3d.renderings.create_scene import SceneRequest, create_scene
-from map3d.types import ViewAngles
+from map3d.renderings.create import create_rendering
+from map3d.renderings.create_scene import create_scene
+from map3d.requests import CreateRendering, CreateScene
+from map3d.requests.json_values import from_json
 from map3d.web.access import require
 from map3d.web.api_document import openapi_document
 from map3d.web.api_route import LIMIT, MAX_PAGE, Query, api, route
@@ -22,7 +20,6 @@ from map3d.web.document_routes import catalogue, workspace
 PAGE: Final = 100
 ESTIMATE_AGAIN_S: Final = 10
 _AFTER: Final = Query("after", "Name after which the page begins.")
-_LAYER_OPTIONS: Final = ("data", "color", "quality", "small", "radius_m")
 _estimating: Final = Lock()
 __all__ = ["api"]
 
@@ -42,7 +39,9 @@ def scenes(limit: int | None, after: str | None) -> dict[str, Any]:
 
 @route("POST", "/scenes", "Creates an empty scene.", "Scene", role="editor", status=201, body="NewScene")
 def new_scene(body: dict[str, Any]) -> Any:
-    record = create_scene(workspace(), catalogue(), SceneRequest(**body))
+    values = {**body, **body.get("options", {})}
+    values.pop("options", None)
+    record = create_scene(workspace(), catalogue(), from_json(CreateScene, values))
     return scene_value(record), {"Location": f"scenes/{record.name}"}
 
 
@@ -74,7 +73,7 @@ def renderings(scene: str | None, limit: int | None, after: str | None) -> dict[
 
 @route("POST", "/renderings", "Creates a rendering of a built scene.", "Rendering", role="editor", status=201, body="NewRendering")
 def new_rendering(body: dict[str, Any]) -> Any:
-    record = create_rendering(workspace(), catalogue(), _rendering_request(body))
+    record = create_rendering(workspace(), catalogue(), from_json(CreateRendering, body))
     return rendering_value(record), {"Location": f"renderings/{record.name}"}
 
 
@@ -189,26 +188,3 @@ def _states(text: str | None) -> list[OperationState] | None:
         return [OperationState(part) for part in text.split(",")]
     except ValueError:
         raise BadRequest(f"state={text[:64]!r}: use {', '.join(OperationState)}, separated by commas") from None
-
-
-def _rendering_request(body: dict[str, Any]) -> RenderingRequest:
-    """Raises BadRequest."""
-    if "views" in body and ("directions" in body or "pitch" in body):
-        raise BadRequest("give either views, or directions and pitch")
-    views = [ViewAngles(*view) for view in body["views"]] if "views" in body else None
-    names = ("res_m", "levels", "tile_px", "title", "attribution")
-    options: dict[str, Any] = {name: body[name] for name in _LAYER_OPTIONS if name in body}
-    options |= {name: tuple(body[name]) for name in ("sun", "place") if name in body}
-    try:
-        options |= {"time": datetime.fromisoformat(body["time"])} if "time" in body else {}
-        options |= {"day": date.fromisoformat(body["day"])} if "day" in body else {}
-    except ValueError as error:
-        raise BadRequest(f"time or day: {error}; write e.g. 2026-06-21T15:00+02:00 and 2026-06-21") from None
-    return RenderingRequest(
-        body["scene"],
-        body["name"],
-        views or views_around(body.get("directions", 4), [body.get("pitch", DEFAULT_PITCH_DEG)]),
-        layers=layer_request(body.get("layers"), **options),
-        window=tuple(body["window"]) if "window" in body else None,
-        **{name: body[name] for name in names if name in body},
-    )

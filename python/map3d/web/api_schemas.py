@@ -6,7 +6,10 @@ from typing import Any, Final
 from map3d.catalogue import OperationState, State
 from map3d.catalogue.operation_records import OPERATION_KINDS
 from map3d.operations.arguments import ARGUMENTS
-from map3d.types import COLOR_FORMATS, LAYER_KINDS, LAYERS_BY_DATA, TILE_PX
+from map3d.requests import CreateRendering, CreateScene
+from map3d.requests.json_values import schemas_of
+from map3d.requests.scenes import BuildSteps
+from map3d.types import LAYER_KINDS
 
 Schema = Mapping[str, Any]
 
@@ -38,7 +41,8 @@ def _page(name: str, item: str) -> dict[str, Any]:
     return _object({name: _array(ref(item)), "next": rest}, name)
 
 
-_SWITCH: Final = {"type": "boolean", "description": "A step of the build."}
+_STEPS: Final = schemas_of(BuildSteps)
+_NEW_SCENE: Final = {name: schema for name, schema in schemas_of(CreateScene).items() if name not in _STEPS}
 
 SCHEMAS: Final[dict[str, Schema]] = {
     "Problem": {
@@ -59,19 +63,7 @@ SCHEMAS: Final[dict[str, Schema]] = {
         },
         "name title attribution built",
     ),
-    "NewScene": _object(
-        {
-            "name": _NAME,
-            "title": TEXT,
-            "attribution": TEXT,
-            "crs": {**TEXT, "description": 'Such as EPSG:25832, or "local"; by default that of the first file.'},
-            "ground_plane": {"type": "string", "enum": ["auto", "on", "off"]},
-            "keep_outliers": {**_FLAG, "description": "Keep content however far it is from the rest."},
-            "cluster": {**COUNT, "description": "Of files in places far from each other, the number of the place to build; 0 is the largest."},
-            "options": _object(dict.fromkeys(("merge_vertices", "merge_faces", "drop_degenerate", "merge_materials", "drop_untextured"), _SWITCH)),
-        },
-        "name",
-    ),
+    "NewScene": _object({**_NEW_SCENE, "name": _NAME, "options": _object(_STEPS)}, "name"),
     "Asset": _object({"name": _NAME, "file": TEXT, "format": TEXT, "digest": TEXT, "triangles": COUNT, "skipped": COUNT, "warnings": COUNT}, "*"),
     "AssetReport": _object(
         {
@@ -99,36 +91,7 @@ SCHEMAS: Final[dict[str, Schema]] = {
         },
         "*",
     ),
-    "NewRendering": _object(
-        {
-            "scene": _NAME,
-            "name": _NAME,
-            "title": TEXT,
-            "attribution": TEXT,
-            "views": _array(_array(_NUMBER, 2), minItems=1, maxItems=360, description="Look-at angle and pitch of each view, degrees."),
-            "directions": {"type": "integer", "minimum": 1, "maximum": 360, "description": "Instead of views: evenly spaced look-at angles."},
-            "pitch": {**_NUMBER, "description": "Pitch for directions; 45 by default."},
-            "res_m": {"type": "number", "minimum": 1e-6, "description": "Metres per pixel at the deepest level."},
-            "levels": {"type": "integer", "minimum": 1, "maximum": 27, "description": "Instead of res_m."},
-            "tile_px": {"type": "integer", "enum": list(TILE_PX)},
-            "window": _array(_NUMBER, 3, description="x, y of the centre and the side of the square to render, metres."),
-            "layers": _array(TEXT, minItems=1, description="KIND or NAME=KIND each."),
-            "data": {
-                "type": "string",
-                "enum": list(LAYERS_BY_DATA),
-                "description": "Instead of layers: normal, id and depth as three PNG layers, or as one layer of data tiles.",
-            },
-            "color": {"type": "string", "enum": list(COLOR_FORMATS)},
-            "quality": {"type": "integer", "minimum": 1, "maximum": 100},
-            "small": _FLAG,
-            "time": {**_TIME, "description": "Layers sun and picture: date and time with time zone."},
-            "sun": _array(_NUMBER, 2, description="Instead of time: azimuth and elevation of the sun, degrees."),
-            "day": {"type": "string", "format": "date", "description": "Layer sun16."},
-            "radius_m": {**_NUMBER, "description": "Layers ao and picture."},
-            "place": _array(_NUMBER, 2, description="Latitude and longitude of a scene in local metres, degrees."),
-        },
-        "scene name",
-    ),
+    "NewRendering": _object({**schemas_of(CreateRendering), "scene": _NAME, "name": _NAME}, "scene name"),
     "Estimate": _object(
         {
             **dict.fromkeys(("base_tiles", "tiles", "images", "bytes", "open_tiles"), COUNT),

@@ -9,10 +9,10 @@ from typing import Any, Final
 from map3d.catalogue import SceneRecord
 from map3d.errors import BadRequest
 from map3d.geometry.sun import SunAngles
-from map3d.geometry.views import check_angles, views_around
-from map3d.renderings.create import RenderingRequest
-from map3d.renderings.layers import LayerRequest
-from map3d.renderings.sun_layers import ONE_SUN, LightRequest
+from map3d.geometry.views import check_angles
+from map3d.renderings.layers import make_layers
+from map3d.renderings.sun_layers import ONE_SUN
+from map3d.requests import CreateRendering, LayerDetails
 from map3d.types import DATA_TILE_KINDS, DEFAULT_DATA, LAYER_KINDS, LAYERS_BY_DATA, TILE_PX, Box, DataEncoding, Layer, LayerKind, ViewAngles
 
 DIRECTIONS: Final = (1, 2, 4, 8, 16)
@@ -36,11 +36,19 @@ class RenderingForm:
     time: str
     day: str
 
-    def request(self, scene: str, name: str) -> RenderingRequest:
+    def request(self, scene: str, name: str) -> CreateRendering:
         """Raises BadRequest."""
-        views = views_around(self.directions, (self.pitch_deg,))
-        layers = LayerRequest(self.stored_layers, light=self._light())
-        return RenderingRequest(scene, name, views, res_m=self.res_m, layers=layers, tile_px=self.tile_px, title=self.title)
+        return CreateRendering(
+            scene=scene,
+            name=name,
+            directions=self.directions,
+            pitch=(self.pitch_deg,),
+            res_m=self.res_m,
+            layers=self.stored_layers,
+            tile_px=self.tile_px,
+            title=self.title,
+            **self._light(),
+        )
 
     @property
     def stored_layers(self) -> tuple[LayerKind, ...]:
@@ -49,14 +57,14 @@ class RenderingForm:
             return self.layers
         return tuple(dict.fromkeys("data" if kind in DATA_TILE_KINDS else kind for kind in self.layers))
 
-    def _light(self) -> LightRequest:
+    def _light(self) -> dict[str, Any]:
         one, whole = any(kind in self.layers for kind in ONE_SUN), "sun16" in self.layers
         try:
             time = datetime.fromisoformat(self.time + ("+00:00" if "+" not in self.time and "Z" not in self.time else "")) if one else None
             day = date.fromisoformat(self.day) if whole else None
         except ValueError as error:
             raise BadRequest("the layers sun, picture and sun16 need a date and a time of the sun") from error
-        return LightRequest(time=time, day=day)
+        return {"time": time, "day": day}
 
 
 @dataclass(frozen=True)
@@ -70,8 +78,7 @@ class PreviewQuery:
 
     def layer(self, scene: SceneRecord, box: Box) -> Layer:
         """Raises BadRequest."""
-        light = LightRequest(sun=_SUN if self.kind in ONE_SUN else None)
-        return LayerRequest((self.kind,), color="webp", light=light).layers(scene, box)[0]
+        return make_layers((self.kind,), LayerDetails(sun=_SUN if self.kind in ONE_SUN else None), scene, box)[0]
 
 
 def read_form(fields: Any) -> RenderingForm:

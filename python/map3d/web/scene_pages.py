@@ -11,8 +11,10 @@ from map3d.catalogue import AssetRecord, RenderingRecord, SceneRecord
 from map3d.errors import BadRequest, CrsError, Map3dError, NotFound
 from map3d.publish.published_folders import folders_of
 from map3d.renderings.build import is_stale
-from map3d.renderings.create_scene import SceneRequest, create_scene
+from map3d.renderings.create_scene import create_scene
 from map3d.renderings.outliers import read_outliers
+from map3d.requests import CreateScene
+from map3d.requests.json_values import from_json
 from map3d.types import check_name
 from map3d.web.access import requires
 from map3d.web.document_routes import catalogue, workspace
@@ -47,9 +49,9 @@ def new_scene() -> Response:
 def send_new_scene() -> Response:
     form = {name: request.form.get(name, "").strip() for name in ("name", "title", "attribution", "crs", "ground_plane")}
     name = form["name"] or name_from(form["title"])
-    wanted = SceneRequest(name, form["title"], form["attribution"], crs=form["crs"] or None, ground_plane=form["ground_plane"] or "auto")
+    values = {field: value for field, value in form.items() if value}
     try:
-        create_scene(workspace(), catalogue(), wanted)
+        create_scene(workspace(), catalogue(), from_json(CreateScene, {**values, "name": name}))
     except (BadRequest, CrsError) as error:
         return page("new_scene.html", 400, form=form, problem=str(error))
     return go_to(f"studio/scenes/{name}")

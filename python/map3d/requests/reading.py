@@ -1,0 +1,91 @@
+"""Requests that read files: add files, inspect."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from map3d.requests.param import param
+
+
+def crs_param() -> Any:
+    return param(
+        None,
+        help="Coordinate system of the files, where they do not state it or state it wrongly; 'local' for local metres.",
+        label="Coordinate system of the files",
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FormatOptions:
+    """What to read of a format."""
+
+    up: str = param("z", help="OBJ: the axis that points up.", label="OBJ: upward axis", choices=("y", "z"))
+    split: str = param("file", help="OBJ: the part that becomes one object.", label="OBJ: one object per", choices=("file", "group"))
+    theme: str | None = param(
+        None, help="CityGML: the appearance theme to use.", words="the one with the most textures", label="CityGML: appearance theme"
+    )
+    lod: str | None = param(None, help="CityGML: the level of detail to use.", words="the best of each object", label="CityGML: level of detail")
+    interiors: bool = param(False, help="CityGML: draw rooms and what is in them.", words="leave them out", label="CityGML: draw rooms")
+    transparency: str = param(
+        "auto",
+        help="How transparency of materials is read; inverted: it is opacity; auto: as opacity in files whose materials would all be faint and some "
+        "invisible.",
+        label="Transparency of materials",
+        choices=("auto", "as-is", "inverted"),
+    )
+    max_error_m: float = param(
+        0.0,
+        help="Elevation models: greatest height error in metres of the triangles; 0 keeps every height.",
+        words="0",
+        option="--max-error",
+        label="Elevation models: greatest height error in metres",
+        minimum=0.0,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadLimits:
+    """Limits of the process that reads a file. None is the default of the format and size of the file."""
+
+    parse_memory_bytes: int | None = param(
+        None,
+        help="Memory limit for reading a file.",
+        example="2G",
+        words="1G; 2G for rasters and above 100 MB",
+        option="--parse-memory",
+        label="Memory limit for reading a file",
+        minimum=1,
+        is_size=True,
+    )
+    parse_cpu_s: int | None = param(
+        None,
+        help="Limit in CPU seconds for reading a file.",
+        words="60 per 100 MB; 600 for rasters",
+        option="--parse-cpu",
+        label="Limit in CPU seconds for reading a file",
+        minimum=1,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class AddFiles(FormatOptions, ReadLimits):
+    """Imports files into a scene."""
+
+    crs: str | None = crs_param()
+    name: str | None = param(None, help="Name of the asset, for a single file.", words="name of the file", label="Name of a single file")
+    strict: bool = param(False, help="Stop at the first problem instead of skipping and counting it.", label="Stop at the first problem")
+    skip_unchanged: bool = param(
+        False,
+        help="Leave files alone that are in the scene as they are.",
+        lacks={
+            "cli": "the command imports what it is given again, so that a user can repair an asset",
+            "rest": "a repeated operation goes on where the first one ended, so that unchanged files are always skipped",
+            "studio": "as in the REST API",
+        },
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inspect(FormatOptions, ReadLimits):
+    """Says what files hold."""
+
+    crs: str | None = crs_param()
