@@ -122,7 +122,7 @@ def test_scene_is_created_with_a_name_from_its_title(studio):
         ({"title": "T", "crs": "nonsense"}, "nonsense"),
         ({"title": "T", "name": "../x"}, "scene name"),
         ({"title": "***"}, "scene name"),
-        ({"title": "T", "ground_plane": "x"}, "ground plane"),
+        ({"title": "T", "ground_plane": "x"}, "ground_plane is"),
     ],
 )
 def test_wrong_scene_is_refused_and_the_form_keeps_its_fields(studio, fields, says):
@@ -368,6 +368,9 @@ def test_rendering_from_the_form_to_the_map_and_away(town):
         ({"layer": "sun"}, "date and a time"),
         ({"res": "0.000001"}, "res is"),
         ({"directions": "1e9"}, "directions is"),
+        ({"quality": "101"}, "quality is '101', expected a whole number from 1 to 100"),
+        ({"color": "gif"}, "color is 'gif', expected webp or png or jpeg"),
+        ({"window": "1,2"}, "window is '1,2', expected 3 numbers"),
     ],
 )
 def test_wrong_rendering_is_refused(town, fields, says):

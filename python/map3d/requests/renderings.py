@@ -67,6 +67,7 @@ class LayerDetails:
     sun: SunAngles | None = param(
         None,
         help="Layers sun and picture, instead of {time}: the sun's azimuth clockwise from true north and its elevation, in degrees.",
+        example="195,60",
         label="Instead of a time: azimuth and elevation of the sun in degrees",
     )
     day: date | None = param(
@@ -84,6 +85,7 @@ class LayerDetails:
     place: GeographicPosition | None = param(
         None,
         help="Sun layers of a scene in local metres: its position on earth, in degrees; the y axis points north.",
+        example="48.76,11.42",
         label="Scenes in local metres: latitude and longitude in degrees",
     )
 
@@ -126,6 +128,7 @@ class CreateRendering(LayerDetails):
     window: Window | None = param(
         None,
         help="Render only a square of SIZE metres in each view, centred on the ground point X, Y in the scene's coordinate system.",
+        example="691000,5336000,2000",
         label="Only a square: x and y of its centre in the scene's coordinate system, and its side in metres",
     )
     layers: tuple[str, ...] | None = param(None, help=_LAYERS, words=",".join(LAYERS_BY_DATA[DEFAULT_DATA]), minimum=1, label="Layers")

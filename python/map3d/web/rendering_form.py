@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date, datetime
 from typing import Any, Final
 
@@ -13,42 +13,35 @@ from map3d.geometry.views import check_angles
 from map3d.renderings.layers import make_layers
 from map3d.renderings.sun_layers import ONE_SUN
 from map3d.requests import CreateRendering, LayerDetails
-from map3d.types import DATA_TILE_KINDS, DEFAULT_DATA, LAYER_KINDS, LAYERS_BY_DATA, TILE_PX, Box, DataEncoding, Layer, LayerKind, ViewAngles
+from map3d.requests.json_values import from_json
+from map3d.types import DATA_TILE_KINDS, DEFAULT_DATA, LAYER_KINDS, LAYERS_BY_DATA, Box, DataEncoding, Layer, LayerKind, ViewAngles
+from map3d.web.forms import more_values
 
-DIRECTIONS: Final = (1, 2, 4, 8, 16)
-RESOLUTIONS: Final = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+DEFAULT_RES_M: Final = 0.2
 _SUN: Final = SunAngles(160.0, 45.0)
 """Azimuth and elevation of the sun in previews."""
 
 
 @dataclass(frozen=True)
 class RenderingForm:
-    """The fields as the user left them; `request` checks them. `layers` never has the kind data: `data` says how normal, id and depth are stored."""
+    """The fields as the user left them; `request` checks them. `layers` never has the kind data: `data` says how normal, id and depth are stored.
+    `res_m`: None for a number of levels, which is in `more`, as the REST API takes it."""
 
     name: str
     title: str
     directions: int
     pitch_deg: float
-    res_m: float
+    res_m: float | None
     layers: tuple[LayerKind, ...]
     data: DataEncoding
-    tile_px: int
     time: str
     day: str
+    more: Mapping[str, Any] = field(default_factory=dict)
 
     def request(self, scene: str, name: str) -> CreateRendering:
         """Raises BadRequest."""
-        return CreateRendering(
-            scene=scene,
-            name=name,
-            directions=self.directions,
-            pitch=(self.pitch_deg,),
-            res_m=self.res_m,
-            layers=self.stored_layers,
-            tile_px=self.tile_px,
-            title=self.title,
-            **self._light(),
-        )
+        values = {"scene": scene, "name": name, "title": self.title, "directions": self.directions, "pitch": self.pitch_deg, **self.more}
+        return from_json(CreateRendering, values, res_m=self.res_m, layers=self.stored_layers, **self._light())
 
     @property
     def stored_layers(self) -> tuple[LayerKind, ...]:
@@ -58,7 +51,7 @@ class RenderingForm:
         return tuple(dict.fromkeys("data" if kind in DATA_TILE_KINDS else kind for kind in self.layers))
 
     def _light(self) -> dict[str, Any]:
-        one, whole = any(kind in self.layers for kind in ONE_SUN), "sun16" in self.layers
+        one, whole = "sun" not in self.more and any(kind in self.layers for kind in ONE_SUN), "sun16" in self.layers
         try:
             time = datetime.fromisoformat(self.time + ("+00:00" if "+" not in self.time and "Z" not in self.time else "")) if one else None
             day = date.fromisoformat(self.day) if whole else None
@@ -84,18 +77,18 @@ class PreviewQuery:
 def read_form(fields: Any) -> RenderingForm:
     """Reads a form or query; missing fields get their defaults. Raises BadRequest for numbers that are not."""
     layers = tuple(kind for kind in LAYER_KINDS if kind in fields.getlist("layer") and kind != "data") or LAYERS_BY_DATA["png"]
-    data = fields.get("data")
+    data, more = fields.get("data"), more_values(CreateRendering, fields)
     return RenderingForm(
         name=fields.get("name", "").strip(),
         title=fields.get("title", "").strip(),
         directions=round(_number(fields, "directions", 4, 1, 360)),
         pitch_deg=_number(fields, "pitch", 45, 1, 90),
-        res_m=_number(fields, "res", 0.2, 0.001, 1e6),
+        res_m=None if "levels" in more else _number(fields, "res", DEFAULT_RES_M, 0.001, 1e6),
         layers=layers,
         data=data if data in LAYERS_BY_DATA else DEFAULT_DATA,
-        tile_px=TILE_PX[-1] if fields.get("tile") == str(TILE_PX[-1]) else TILE_PX[0],
         time=fields.get("time", "").strip(),
         day=fields.get("day", "").strip(),
+        more=more,
     )
 
 

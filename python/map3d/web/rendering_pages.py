@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from flask import Blueprint, jsonify, request
 from werkzeug import Response
+from werkzeug.datastructures import MultiDict
 
 from map3d.catalogue import OperationRecord, RenderingRecord, State
 from map3d.catalogue.operation_records import OperationState
@@ -15,9 +16,11 @@ from map3d.publish.published_folders import find_published, folders_of, publishe
 from map3d.renderings.build import is_stale
 from map3d.renderings.create import create_rendering
 from map3d.renderings.track_stores import read_manifest
+from map3d.requests import CreateRendering, Publish
 from map3d.types import check_name
 from map3d.web.access import requires
 from map3d.web.document_routes import catalogue, workspace
+from map3d.web.forms import form_values, more_controls
 from map3d.web.operation_words import show_all
 from map3d.web.page_formats import duration, size
 from map3d.web.page_tools import translate
@@ -87,6 +90,7 @@ def rendering_page(rendering: str) -> Response:
     quarantine = list(islice(catalogue().jobs(rendering, state=State.QUARANTINED), QUARANTINED))
     has_map = read_manifest(workspace(), record) is not None
     values |= {"rendering": record, "scene": catalogue().scene(record.scene), "folders": published_folders(workspace(), rendering)}
+    values |= {"more": more_controls(Publish, MultiDict())}
     return page("rendering.html", **values, quarantine=quarantine, has_map=has_map, changed=has_map and _is_changed(record, found))
 
 
@@ -102,8 +106,7 @@ def render(rendering: str) -> Response:
 @requires("editor")
 def publish(rendering: str) -> Response:
     catalogue().rendering(check_name(rendering, "rendering"))
-    folder = request.form.get("folder", "").strip()
-    ask("publish", rendering, **({"folder": folder} if folder else {}))
+    ask("publish", rendering, **form_values(Publish, request.form))
     return go_to(f"studio/renderings/{rendering}")
 
 
@@ -164,7 +167,8 @@ def _form_page(scene: str, form: RenderingForm, problem: str, status: int = 200)
             words = _estimate_words(scene, form)
         except Map3dError as error:
             words = {"problem": str(error)}
-    return page("new_rendering.html", status, scene=record, form=form, problem=problem, built=built, words=words)
+    values = {"scene": record, "form": form, "problem": problem, "built": built, "words": words}
+    return page("new_rendering.html", status, **values, more=more_controls(CreateRendering, request.values))
 
 
 def _estimate_words(scene: str, form: RenderingForm) -> dict[str, str]:

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from flask import Blueprint, request
 from werkzeug import Response
+from werkzeug.datastructures import MultiDict
 
 from map3d.catalogue import AssetRecord, RenderingRecord, SceneRecord
 from map3d.errors import BadRequest, CrsError, Map3dError, NotFound
@@ -13,11 +14,12 @@ from map3d.publish.published_folders import folders_of
 from map3d.renderings.build import is_stale
 from map3d.renderings.create_scene import create_scene
 from map3d.renderings.outliers import read_outliers
-from map3d.requests import CreateScene
+from map3d.requests import AddFiles, CreateScene
 from map3d.requests.json_values import from_json
 from map3d.types import check_name
 from map3d.web.access import requires
 from map3d.web.document_routes import catalogue, workspace
+from map3d.web.forms import form_values, more_controls
 from map3d.web.operation_words import show_all
 from map3d.web.outlier_words import outlier_words
 from map3d.web.report_words import missing_files, placing_words, report_lines, summary_of
@@ -41,20 +43,23 @@ def home() -> Response:
 @scene_pages.get("/scenes/new")
 @requires("editor")
 def new_scene() -> Response:
-    return page("new_scene.html", form={}, problem="")
+    return _new_scene_page(MultiDict(), "")
 
 
 @scene_pages.post("/scenes/new")
 @requires("editor")
 def send_new_scene() -> Response:
-    form = {name: request.form.get(name, "").strip() for name in ("name", "title", "attribution", "crs", "ground_plane")}
-    name = form["name"] or name_from(form["title"])
-    values = {field: value for field, value in form.items() if value}
     try:
-        create_scene(workspace(), catalogue(), from_json(CreateScene, {**values, "name": name}))
+        values = form_values(CreateScene, request.form)
+        name = values.setdefault("name", name_from(values.get("title", "")))
+        create_scene(workspace(), catalogue(), from_json(CreateScene, values))
     except (BadRequest, CrsError) as error:
-        return page("new_scene.html", 400, form=form, problem=str(error))
+        return _new_scene_page(request.form, str(error), 400)
     return go_to(f"studio/scenes/{name}")
+
+
+def _new_scene_page(form: MultiDict[str, str], problem: str, status: int = 200) -> Response:
+    return page("new_scene.html", status, form=form, problem=problem, more=more_controls(CreateScene, form))
 
 
 @scene_pages.get("/scenes/<scene>")
@@ -66,7 +71,7 @@ def scene_page(scene: str) -> Response:
     values: dict[str, Any] = {"scene": record, "assets": assets, "operations": operations, "running": any(one.is_open for one in operations)}
     far = outlier_words(read_outliers(workspace(), scene), record) if assets else None
     stale = bool(assets) and is_stale(workspace(), catalogue(), scene)
-    return page("scene.html", **values, renderings=_listed_renderings(scene), stale=stale, far=far)
+    return page("scene.html", **values, renderings=_listed_renderings(scene), stale=stale, far=far, more=more_controls(AddFiles, MultiDict()))
 
 
 @scene_pages.post("/scenes/<scene>/import")
@@ -75,11 +80,7 @@ def import_uploads(scene: str) -> Response:
     """Asks for the import of uploads, and for a build after it."""
     request.max_content_length = request.max_form_memory_size = MAX_IMPORT_BYTES
     catalogue().scene(check_name(scene, "scene"))
-    options: dict[str, Any] = {
-        name: value for name in ("crs", "up", "split", "lod", "theme", "transparency") if (value := request.form.get(name, "").strip())
-    }
-    if request.form.get("interiors"):
-        options["interiors"] = True
+    options = form_values(AddFiles, request.form)
     ask("import", scene, files=request.form.getlist("file"), options=options)
     ask("build", scene)
     return go_to(f"studio/scenes/{scene}")

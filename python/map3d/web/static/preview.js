@@ -65,7 +65,7 @@ if (form) {
     if (name === "look") at = null;
     if (["pitch", "look", "kind"].includes(name)) soonBoth();
     if (name === "res") soonDetail();
-    if (["directions", "pitch", "res", "layer", "time", "day"].includes(name)) soonEstimate();
+    if (!["look", "kind", "title", "name"].includes(name)) soonEstimate();
   });
 
   const choose = (x, y) => {

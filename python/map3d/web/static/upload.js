@@ -234,7 +234,7 @@ function Uploader(place) {
     find("rate").textContent = texts.importing;
     sending = true;
     const form = new URLSearchParams(items.map((item) => ["file", item.url.split("/").pop()]));
-    for (const field of place.querySelectorAll("[data-list] [name]")) if (field.value) form.set(field.name, field.value);
+    for (const field of place.querySelectorAll("[data-list] [name]")) if (field.value && (field.type !== "checkbox" || field.checked)) form.set(field.name, field.value);
     const answer = await fetch(place.dataset.import, { method: "POST", body: form, headers: { "X-CSRF-Token": place.dataset.csrf, accept: "text/plain" } }).catch(() => null);
     if (answer?.ok) {
       for (const item of items) remember(item.key, null);
