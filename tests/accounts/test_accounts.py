@@ -59,6 +59,11 @@ def test_length_of_passwords(accounts: Accounts, password: str, accepted: bool) 
             accounts.add_user("anna", password, "viewer")
 
 
+def test_a_hash_takes_32_mib(accounts: Accounts) -> None:
+    accounts.add_user("anna", PASSWORD, "viewer")
+    assert accounts.catalogue.user("anna").password_hash.startswith("scrypt:32768:8:1$")
+
+
 def test_unknown_names_cost_a_hash_too(accounts: Accounts, monkeypatch: pytest.MonkeyPatch) -> None:
     checked: list[str] = []
     monkeypatch.setattr(passwords, "check_password_hash", lambda stored, _: bool(checked.append(stored)))

@@ -95,10 +95,10 @@ def test_limits_grow_with_the_file(tmp_path: Path, size: int, memory: int, cpu_s
 def test_the_processor_time_limit_restarts_for_every_file() -> None:
     child = Subprocess("tests.ingest.misbehaving_parsers:open_worker", {}, limits=Limits(cpu_s=1))
     child.wait_ready(30)
-    for _ in range(4):
-        assert isinstance(child.request({"cpu_s": 0.6}, wall_s=30), Message)
+    for _ in range(2):
+        assert isinstance(child.request({"cpu_s": 0.7}, wall_s=30), Message)
     with pytest.raises(LimitExceeded):
-        child.request({"cpu_s": 5.0}, wall_s=60)
+        child.request({"cpu_s": 3.0}, wall_s=60)
     child.close()
 
 

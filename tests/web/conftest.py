@@ -6,9 +6,20 @@ from pathlib import Path
 import httpx
 import pytest
 
+from map3d.accounts import passwords
 from map3d.catalogue import Workspace
 from map3d.web.asgi_app import App, create_app
 from tests.web.workspaces import make_workspace
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick_passwords() -> Iterator[None]:
+    """Makes hashes of passwords in a millisecond; those of tests/accounts are the product's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(passwords, "METHOD", "scrypt:256:8:1")
+        passwords._hash_of_nobody.cache_clear()
+        yield
+    passwords._hash_of_nobody.cache_clear()
 
 
 @pytest.fixture(scope="session")

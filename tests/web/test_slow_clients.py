@@ -18,10 +18,14 @@ CONNECTIONS = 2_100
 HEAD = b"GET /healthz HTTP/1.1\r\nHost: x\r\n"
 
 
+IMPATIENT = "from map3d.web import server\nserver.HEADER_TIMEOUT_MS = 1_000\n"
+
+
 @pytest.fixture
-def address(finished, tmp_path) -> Iterator[httpx.URL]:
+def address(finished, tmp_path, request) -> Iterator[httpx.URL]:
+    """The address of a server; a parameter is code that runs first."""
     script = tmp_path / "serve.py"
-    script.write_text(SCRIPT)
+    script.write_text(getattr(request, "param", "") + SCRIPT)
     command = [sys.executable, str(script), str(finished.root), "1"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)})
     yield httpx.URL(process.stdout.readline().strip())
@@ -59,6 +63,7 @@ def test_idle_connections_do_not_hold_the_server(address, many_files, sent):
             one.close()
 
 
+@pytest.mark.parametrize("address", [IMPATIENT], indirect=True, ids=["impatient"])
 def test_a_connection_without_a_request_is_closed(address):
     with socket.create_connection((address.host, address.port), timeout=60) as connection:
         connection.sendall(HEAD)

@@ -10,6 +10,7 @@ from map3d.errors import BadRequest
 
 MIN_CHARACTERS: Final = 10
 MAX_CHARACTERS: Final = 256
+METHOD: Final = "scrypt"
 HASHES_AT_ONCE: Final = 2
 """A hash takes 32 MiB and a tenth of a second; further ones wait."""
 
@@ -23,7 +24,7 @@ def hash_password(password: str, user: str = "") -> str:
     if user and user.casefold() in password.casefold() and len(password) < len(user) + MIN_CHARACTERS:
         raise BadRequest("the password contains the user name; choose another one")
     with _turn:
-        return generate_password_hash(password, method="scrypt")
+        return generate_password_hash(password, method=METHOD)
 
 
 def is_password(password: str, password_hash: str | None) -> bool:
@@ -36,4 +37,4 @@ def is_password(password: str, password_hash: str | None) -> bool:
 
 @cache
 def _hash_of_nobody() -> str:
-    return generate_password_hash("nobody", method="scrypt")
+    return generate_password_hash("nobody", method=METHOD)
