@@ -47,7 +47,7 @@ def small_param() -> Any:
 
 
 def color_param(layers: str) -> Any:
-    return param("webp", help=f"Image format of the {layers}.", choices=COLOR_FORMATS, label="Image format of colours")
+    return param(COLOR_FORMATS[0], help=f"Image format of the {layers}.", choices=COLOR_FORMATS, label="Image format of colours")
 
 
 def res_param(help: str, **more: Any) -> Any:
