@@ -12,6 +12,8 @@ from typing import Final
 
 GRACE_S: Final = 10.0
 """A process that has been told to end has this time."""
+KEPT: Final = {"dask-scratch-space"}
+"""Empty folders that programs of others keep for their next run."""
 session_processes: Final = set[int]()
 """Servers that serve all tests of a session."""
 
@@ -55,7 +57,7 @@ def _left(folder: Path, processes: dict[int, str], files: set[str]) -> list[str]
 
 
 def _files(folder: Path) -> set[str]:
-    return {str(path) for path in folder.iterdir()}
+    return {str(path) for path in folder.iterdir() if path.name not in KEPT}
 
 
 def _processes(folder: Path) -> dict[int, str]:

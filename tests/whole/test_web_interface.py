@@ -55,7 +55,7 @@ def tell(workspace: Path, archive: Path, label: str, window: str, system: str, *
         found = browse("web_interface.mjs", origin=origin, **asked, **who, **more)
         building = clicked(str(found["building"]), str(found["url"]))
         check_portrayal(origin, STORY, system, building, pictures / f"web-interface-{label}-3dps")
-        if qgis_version() is not None:
+        if qgis_version(workspace.parent) is not None:
             shutil.copy(check_qgis(origin, workspace, STORY, building, workspace.parent), pictures / f"web-interface-{label}-qgis.png")
         check_preview(str(found["link"]), building)
         end = browse("web_interface_end.mjs", origin=origin, link=found["link"], name=STORY, state=found["cookies"], **asked)
@@ -92,7 +92,7 @@ def test_from_an_archive_to_a_map_and_away(workspace: Path, tmp_path: Path, wind
     assert "imported 2 files" in str(found["imported"])
     assert "Textures not found: 1." in str(found["report"])
     assert "Missing files" in str(found["report"])
-    skip_without_qgis()
+    skip_without_qgis(tmp_path)
 
 
 def test_a_real_city(workspace: Path, tmp_path: Path) -> None:
@@ -103,10 +103,10 @@ def test_a_real_city(workspace: Path, tmp_path: Path) -> None:
     found = tell(workspace, archive, "real", "desk", "EPSG:3946", res=0.1, breaks=False, crs="EPSG:3946")
     check_end(found, workspace)
     assert "imported 1 file" in str(found["imported"])
-    skip_without_qgis()
+    skip_without_qgis(tmp_path)
 
 
-def skip_without_qgis() -> None:
+def skip_without_qgis(folder: Path) -> None:
     """Says at the end of a story that one step is missing."""
-    if qgis_version() is None:
+    if qgis_version(folder) is None:
         pytest.skip("all steps passed but QGIS, which is not installed: apt install python3-qgis")
