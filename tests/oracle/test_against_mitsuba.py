@@ -18,7 +18,8 @@ from .mitsuba_scene import MitsubaScene  # noqa: E402
 
 DEPTH_M = 0.005
 COPLANAR_M = 0.01
-VIEWS = ["30-45", *(pytest.param(view, marks=pytest.mark.third_party) for view in ("30-10", "30-22.5", "30-90"))]
+VIEWS = ["30-45", "30-10", "30-22.5", "30-90"]
+FIRST_AND_OTHERS = [VIEWS[0], *(pytest.param(view, marks=pytest.mark.third_party) for view in VIEWS[1:])]
 
 
 @pytest.fixture(scope="session", params=["town", pytest.param("ingolstadt", marks=pytest.mark.third_party)])
@@ -27,7 +28,7 @@ def pair(request: pytest.FixtureRequest) -> tuple[OracleScene, MitsubaScene]:
     return oracle, MitsubaScene(oracle.assets, np.array(oracle.scene.origin), oracle.texture)
 
 
-@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("view", FIRST_AND_OTHERS)
 def test_depth_normal_and_id_agree_away_from_edges(pair: tuple[OracleScene, MitsubaScene], view: str) -> None:
     oracle, mitsuba = pair
     frame = oracle.frames[view]
@@ -51,7 +52,7 @@ def test_depth_normal_and_id_agree_away_from_edges(pair: tuple[OracleScene, Mits
     assert min(shares.values()) >= 0.999, shares
 
 
-@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("view", FIRST_AND_OTHERS)
 def test_colour_is_the_mean_over_the_pixel_box(pair: tuple[OracleScene, MitsubaScene], view: str) -> None:
     oracle, mitsuba = pair
     frame = oracle.frames[view]
