@@ -6,7 +6,8 @@ import pytest
 from rasterio.shutil import copy
 
 from map3d.errors import NotFound, UnknownFormat
-from map3d.ingest.formats import RASTER_FORMATS, RasterFormat, detect_format, find_raster_format
+from map3d.formats.detect import detect_format
+from map3d.formats.raster import RASTER_FORMATS, RasterFormat, find_raster_format
 from map3d.ingest.sources import find_sources
 from map3d.ingest.terrain.raster_georeference import open_raster
 from tests.ingest.terrain.rasters import colours, hills, write
@@ -23,9 +24,12 @@ OBJ = "# made by hand\nmtllib a.mtl\no thing\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3
         ("bom.xml", b"\xef\xbb\xbf" + CITY.encode(), "citygml"),
         ("utf16.xml", b"\xff\xfe" + CITY.encode("utf-16-le"), "citygml"),
         ("space.xml", b"  \n" + CITY.encode(), "citygml"),
+        ("nobom.xml", CITY.encode("utf-16-be"), "citygml"),
         ("a.obj", OBJ.encode(), "obj"),
         ("a.txt", OBJ.encode(), "obj"),
         ("dos.obj", OBJ.replace("\n", "\r\n").encode(), "obj"),
+        ("utf16.obj", OBJ.encode("utf-16"), "obj"),
+        ("long.obj", b"v 0 0 0\n" * 20_000, "obj"),
         ("a.tif", b"II*\0rest", "raster"),
         ("big.tif", b"MM\0+rest", "raster"),
         ("a.jp2", b"\0\0\0\x0cjP  \r\n", "raster"),
@@ -35,7 +39,7 @@ OBJ = "# made by hand\nmtllib a.mtl\no thing\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3
 def test_formats_are_detected_by_content(tmp_path: Path, name: str, content: bytes, format: str) -> None:
     path = tmp_path / name
     path.write_bytes(content)
-    assert detect_format(path) == format
+    assert detect_format(path).name == format
 
 
 @pytest.mark.parametrize(
@@ -55,6 +59,9 @@ def test_formats_are_detected_by_content(tmp_path: Path, name: str, content: byt
         ),
         (b"just some words\nand more\n", "unknown format"),
         (b"v 0 0 0\0\0\0", "unknown format"),
+        (b"v 0 0 0\nword", "unknown format"),
+        (b"<!-- <CityModel> is never closed", "XML without a root"),
+        ("{}".encode("utf-16"), "JSON"),
     ],
 )
 def test_unknown_formats_are_refused_with_the_list_of_readable_ones(tmp_path: Path, content: bytes, description: str) -> None:
@@ -71,7 +78,7 @@ def test_an_image_with_a_world_file_is_a_raster(tmp_path: Path, image: str, worl
     path = tmp_path / image
     path.write_bytes(b"\x89PNG\r\n" if path.suffix == ".png" else b"\xff\xd8\xff\xe0")
     (tmp_path / world_file).write_text("1\n0\n0\n-1\n0\n0\n")
-    assert detect_format(path) == "raster"
+    assert detect_format(path).name == "raster"
 
 
 @pytest.mark.parametrize("format", RASTER_FORMATS, ids=lambda format: format.driver)
@@ -80,7 +87,7 @@ def test_what_gdal_writes_as_a_raster_is_opened_with_the_same_driver(tmp_path: P
     path = tmp_path / "raster.any"
     copy(source, path, driver=format.driver, WORLDFILE="YES")
     assert find_raster_format(path.read_bytes()) is format
-    assert detect_format(path) == "raster"
+    assert detect_format(path).name == "raster"
     with open_raster(path) as raster:
         assert (raster.driver, raster.width, raster.height) == (format.driver, 10, 12)
     if format.is_image:
@@ -93,7 +100,7 @@ def test_an_ascii_grid_may_have_wide_columns(tmp_path: Path) -> None:
     path = tmp_path / "dem.asc"
     heads = {"ncols": 2, "nrows": 2, "xllcorner": 0, "yllcorner": 0, "cellsize": 1}
     path.write_text("".join(f"{name:<30}{value}\n" for name, value in heads.items()) + "1 2\n3 4\n")
-    assert detect_format(path) == "raster"
+    assert detect_format(path).name == "raster"
     with open_raster(path) as raster:
         assert raster.read(1).tolist() == [[1, 2], [3, 4]]
 

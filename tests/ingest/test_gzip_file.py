@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 
 from map3d.errors import LimitExceeded, UnknownFormat
-from map3d.ingest import gzip_file
-from map3d.ingest.formats import detect_format
-from map3d.ingest.gzip_file import content_bytes, content_windows, is_gzip, unpacked_head, unpacked_path
+from map3d.formats import CITYGML, gzip_file
+from map3d.formats.detect import detect_format
+from map3d.formats.gzip_file import content_bytes, content_windows, is_gzip, unpacked_head, unpacked_path
 from map3d.ingest.import_options import GIB, ImportOptions
-from map3d.ingest.referenced_files import find_missing_files, find_referenced_files
 from map3d.ingest.sources import find_sources, source_digest
 from tests.cli.conftest import run
 from tests.cli.towns import Run, house
@@ -37,7 +36,7 @@ def test_the_content_decides(tmp_path: Path) -> None:
         ("c.bin", b"v 0 0 0\n", "obj"),
     ):
         (tmp_path / name).write_bytes(gzip.compress(content))
-        assert detect_format(tmp_path / name) == found
+        assert detect_format(tmp_path / name).name == found
     for content, described in ((b"II*\0", "a gzip file of a raster; unpack it first"), (b"\0", "a gzip file of a file of unknown format")):
         (tmp_path / "d.gz").write_bytes(gzip.compress(content))
         with pytest.raises(UnknownFormat, match=described):
@@ -62,11 +61,11 @@ def test_names_across_the_ends_of_windows_are_found(tmp_path: Path, monkeypatch:
     path.write_text(text)
     (tmp_path / "textures").mkdir()
     (tmp_path / names[7]).write_bytes(b"")
-    plain = find_missing_files(path)
+    plain = CITYGML.find_missing(path, None)
     packed = pack(path)
-    assert find_missing_files(packed) == plain
+    assert CITYGML.find_missing(packed, None) == plain
     assert (plain.images, plain.missing_images) == (3_000, 2_999)
-    assert find_referenced_files(packed) == {(tmp_path / names[7]).resolve()}
+    assert CITYGML.find_files(packed, None) == {(tmp_path / names[7]).resolve()}
 
 
 def test_the_limits_follow_the_content(tmp_path: Path) -> None:

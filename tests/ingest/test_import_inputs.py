@@ -12,10 +12,10 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 
 from map3d.catalogue import AssetRecord, SceneRecord, Workspace
 from map3d.errors import NotFound
-from map3d.ingest.import_inputs import READER_VERSIONS, import_inputs
+from map3d.formats import CITYGML, FORMATS
+from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
-from map3d.ingest.referenced_files import find_missing_files
 from map3d.ingest.sources import find_sources, source_digest
 from tests.ingest.terrain.rasters import write
 
@@ -76,7 +76,7 @@ def test_changed_files_and_readers_count(tmp_path: Path, monkeypatch: pytest.Mon
     path = tmp_path / "a.obj"
     path.write_text(OBJ)
     asset = imported(tmp_path, path, ImportOptions(crs="local"))
-    monkeypatch.setattr("map3d.ingest.import_inputs.READER_VERSIONS", {**READER_VERSIONS, "obj": READER_VERSIONS["obj"] + 1})
+    monkeypatch.setattr("map3d.formats.FORMATS", [replace(format, version=format.version + 1) for format in FORMATS])
     reason = changes(asset, path, ImportOptions(crs="local"))
     assert reason is not None
     assert reason.startswith("map3d reads its format in a new way")
@@ -100,7 +100,7 @@ def test_textures_of_textured_surfaces_count_as_files(tmp_path: Path) -> None:
     before = source_digest(find_sources([path])[0])
     image.write_bytes(b"1")
     assert source_digest(find_sources([path])[0]) != before
-    found = find_missing_files(path)
+    found = CITYGML.find_missing(path, None)
     assert (found.names, found.images, found.missing_images) == (["gone.png"], 2, 1)
 
 
@@ -123,12 +123,12 @@ def test_an_unreadable_file_is_an_error_that_names_it(tmp_path: Path) -> None:
 
 
 def test_readers_that_make_other_assets_have_another_version(tmp_path: Path) -> None:
-    """When this fails, a reader makes another asset of the same file: raise its number in READER_VERSIONS and record the new digests here."""
+    """When this fails, a reader makes another asset of the same file: raise the version in its row of the formats and record the new digests here."""
     (tmp_path / "a.obj").write_text(OBJ)
     (tmp_path / "b.gml").write_text(GML)
     write(tmp_path / "c.tif", (np.arange(17 * 17) * 5 % 11).reshape(1, 17, 17).astype(np.float32))
     found = {name: imported(tmp_path, tmp_path / name, ImportOptions(crs="EPSG:25832")).digest for name in ("a.obj", "b.gml", "c.tif")}
-    assert (dict(READER_VERSIONS), found) == (
+    assert ({format.name: format.version for format in FORMATS}, found) == (
         {"citygml": 11, "obj": 4, "raster": 4},
         {"a.obj": "8d0ceef106fedeffefc608f4ab2e7ffa", "b.gml": "ce43c3ba3b9953057ef04c13e472131e", "c.tif": "c5f3a36ca5208765445bbcd024ea08ea"},
     )

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from map3d.errors import ImportFailed, LimitExceeded
-from map3d.ingest.zip_archive import ArchiveLimits, is_zip, unpack, unpack_here
+from map3d.formats.archive_limits import ArchiveLimits
+from map3d.ingest.zip_archive import is_zip, unpack, unpack_here
 from tests.operations.archives import raw_entry, write_entry, write_zip
 
 LIMITS = ArchiveLimits()

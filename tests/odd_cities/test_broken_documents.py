@@ -8,7 +8,7 @@ import pytest
 
 from map3d.catalogue import Workspace
 from map3d.errors import UnknownFormat
-from map3d.ingest.formats import detect_format
+from map3d.formats.detect import detect_format
 from map3d.ingest.sources import find_sources, source_digest
 from map3d.registry import Registry
 from tests.cli.towns import Run, house

@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 
 from map3d.catalogue import SceneRecord, Workspace
+from map3d.formats import OBJ as OBJ_FORMAT
 from map3d.ingest.import_files import import_files
 from map3d.ingest.import_options import ImportOptions
-from map3d.ingest.referenced_files import find_missing_files, find_referenced_files
 from tests.cli.towns import Run, house
 from tests.odd_cities.towns import write_citygml
 
@@ -53,8 +53,8 @@ def test_nothing_outside_the_given_folder_is_read(tmp_path: Path, outside: str) 
     os.symlink(tmp_path, city / "models" / "linked")
     (city / "models" / "town.mtl").write_text(f"newmtl wall\nmap_Kd {outside}\n")
     assert textures_of(tmp_path, city, "town") == (0, {"images": 1, "missing": 1})
-    assert find_referenced_files(city / "models" / "town.obj", city) == {(city / "models" / "town.mtl").resolve()}
-    assert find_missing_files(city / "models" / "town.obj", city).names == [outside]
+    assert OBJ_FORMAT.find_files(city / "models" / "town.obj", city) == {(city / "models" / "town.mtl").resolve()}
+    assert OBJ_FORMAT.find_missing(city / "models" / "town.obj", city).names == [outside]
 
 
 def test_site_counts_missing_textures_and_says_which_files_it_left_alone(tmp_path: Path, run: Run) -> None:

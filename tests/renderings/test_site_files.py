@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.errors import BadRequest, Map3dError, NotFound
+from map3d.formats import FORMATS
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources, source_digest
@@ -115,14 +117,12 @@ def test_options_of_add_files_count_too(site: Site, folder: Path) -> None:
 
 def test_changed_reader_imports_again(site: Site, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     site.update(folder)
-    monkeypatch.setattr("map3d.ingest.import_inputs.READER_VERSIONS", {"citygml": 1, "obj": 99, "raster": 1})
+    monkeypatch.setattr("map3d.formats.FORMATS", [replace(format, version=99) for format in FORMATS])
     assert site.update(folder).imported == ["a", "b", "c"]
     assert site.update(folder).unchanged == ["a", "b", "c"]
 
 
 def test_assets_of_an_earlier_map3d_are_imported_again_once(site: Site, folder: Path) -> None:
-    from dataclasses import replace
-
     site.update(folder)
     for asset in site.catalogue.assets("town"):
         (source,) = find_sources([Path(asset.source)])

@@ -9,7 +9,7 @@ from map3d.web.forms import FORMS, more_fields
 
 FOLDER = Path(map3d.web.__file__).parent
 CALL = re.compile(r"""(?:\b_|\btranslate|\bN_)\(\s*(?:"((?:[^"\\]|\\.)*)"|'((?:[^'\\]|\\.)*)')""")
-FROM_DATA = {"editor", "viewer"}
+FROM_DATA = {"editor", "viewer", "OBJ with textures", "Terrain"}
 """Texts that templates translate from values."""
 
 

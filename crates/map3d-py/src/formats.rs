@@ -6,14 +6,14 @@ use pyo3::types::PyDict;
 
 /// Returns the name of the format of the document that begins so. `head`: the first HEAD_BYTES of the file, unpacked, or all.
 #[pyfunction]
-pub fn detect_format(head: Vec<u8>) -> Option<&'static str> {
-    detect(&FileHead::new(head)).map(|format| format.name)
+pub fn detect_format(head: &[u8]) -> Option<&'static str> {
+    detect(&FileHead::new(head.to_vec())).map(|format| format.name)
 }
 
 /// Returns the local name of the first element of XML, empty without one; None for anything else.
 #[pyfunction]
-pub fn xml_root(head: Vec<u8>) -> Option<String> {
-    let head = FileHead::new(head);
+pub fn xml_root(head: &[u8]) -> Option<String> {
+    let head = FileHead::new(head.to_vec());
     head.is_xml().then(|| head.xml_root().unwrap_or_default().to_owned())
 }
 

@@ -1,7 +1,7 @@
 """Determines the CRS of an asset's coordinates and transforms them to the scene's."""
 
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +10,11 @@ from pyproj.crs import CompoundCRS
 
 from map3d.catalogue import SceneCrs
 from map3d.errors import CrsError
+from map3d.formats import find_format
 from map3d.geometry.crs import has_ellipsoidal_heights, is_local, parse_crs, vertical_crs, vertical_crs_name
 from map3d.ingest.coordinate_check import CoordinateCheck
 from map3d.ingest.crs_transformer import CrsTransformer, Points, choose_scene_crs
 from map3d.ingest.scene_crs import LOCAL, to_scene_crs
-
-_FORMATS_WITHOUT_CRS: Final = ("obj",)
 
 
 class AssetReprojector:
@@ -85,7 +84,7 @@ class AssetReprojector:
         return [] if self._check is None else self._check.warnings
 
     def _check_crs_is_optional(self) -> None:
-        if self._asset_crs is None and self._format not in _FORMATS_WITHOUT_CRS and not self._scene_is_local:
+        if self._asset_crs is None and find_format(self._format).has_crs and not self._scene_is_local:
             raise CrsError("the file does not name its CRS; name it with --crs, e.g. --crs EPSG:25832, or --crs local for plain metres")
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from map3d.catalogue import AssetRecord, Catalogue, Workspace
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
+from map3d.formats.raster import RASTER
 from map3d.ingest.asset_removal import removed_files
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
@@ -89,7 +90,7 @@ def _import_files(
     waiting, number = list(sources), 0
     with ParserProcess() as parser:
         while waiting or grids.is_waiting:
-            if grids.is_waiting and (not waiting or waiting[0].format == "raster"):
+            if grids.is_waiting and (not waiting or waiting[0].format == RASTER.name):
                 names = {asset.name: Path(asset.source) for asset in catalogue.assets(scene)}
                 waiting, failed = grids.place(waiting, names)
                 result.failed.extend(failed)

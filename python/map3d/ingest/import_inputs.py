@@ -8,12 +8,9 @@ from typing import Any, Final
 
 from map3d.catalogue import AssetRecord
 from map3d.errors import NotFound
-from map3d.ingest.formats import Format
+from map3d.formats import find_format
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.sources import SourceDocument, source_digest
-
-READER_VERSIONS: Final[Mapping[Format, int]] = {"citygml": 11, "obj": 4, "raster": 4}
-"""Raised when a reader makes another asset of the same file, so that existing scenes get the better one (tests/ingest/test_import_inputs.py)."""
 
 _REPORT_KEY: Final = "inputs"
 
@@ -61,7 +58,7 @@ def import_inputs(source: SourceDocument, options: ImportOptions) -> ImportInput
         limits = options.limits(source.data_paths, source.format)
     except OSError as error:
         raise NotFound(f"{error.filename or source.paths[0]}: cannot read the file: {error.strerror or error}") from error
-    return ImportInputs(files, {"crs": options.crs, **options.reader_options(source.format, limits)}, READER_VERSIONS[source.format])
+    return ImportInputs(files, {"crs": options.crs, **options.reader_options(source.format, limits)}, find_format(source.format).version)
 
 
 def _text(value: Any) -> str:

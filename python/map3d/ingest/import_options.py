@@ -5,15 +5,13 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Final
 
-from map3d.ingest.gzip_file import content_bytes
+from map3d.formats import find_format
+from map3d.formats.gzip_file import content_bytes
+from map3d.formats.source_format import GIB
 from map3d.requests.reading import AddFiles, FormatOptions
 from map3d.subprocess import Limits
 
-GIB: Final = 1 << 30
 BIG_FILE_BYTES: Final = 100_000_000
-CPU_S_PER_BIG_FILE: Final = 60
-CPU_S_PER_BIG_RASTER: Final = 600
-"""Rasters are compressed and become triangles and textures."""
 OPEN_FILES: Final = 256
 
 
@@ -32,13 +30,9 @@ class ImportOptions(AddFiles):
 
     def reader_options(self, format: str, limits: Limits) -> dict[str, Any]:
         """Returns the options of the core's Reader."""
-        options: dict[str, Any] = {"strict": self.strict}
-        if format == "obj":
-            options |= {"up": self.up, "split": self.split, "transparency": self.transparency}
-        elif format == "citygml":
-            options |= {"theme": self.theme, "lod": self.lod, "transparency": self.transparency} | ({"interiors": True} if self.interiors else {})
-        elif format == "raster" and self.max_error_m:
-            options |= {"max_error_m": self.max_error_m}
+        known = find_format(format)
+        options: dict[str, Any] = {"strict": self.strict} | {name: getattr(self, name) for name in known.options}
+        options |= {name: value for name in known.sparse_options if (value := getattr(self, name)) != getattr(type(self), name)}
         if limits.address_space_bytes is not None:
             options |= {"max_object_bytes": limits.address_space_bytes // 4, "max_appearance_bytes": limits.address_space_bytes // 4}
         return options
@@ -50,7 +44,7 @@ class ImportOptions(AddFiles):
         times the processor time plus 10 s.
         """
         size = sum(map(content_bytes, paths))
-        raster = format == "raster"
-        cpu_s = self.parse_cpu_s or (CPU_S_PER_BIG_RASTER if raster else CPU_S_PER_BIG_FILE) * max(1, -(-size // BIG_FILE_BYTES))
-        memory = self.parse_memory_bytes or (2 * GIB if raster or size > BIG_FILE_BYTES else GIB)
+        known = find_format(format)
+        cpu_s = self.parse_cpu_s or known.cpu_s * max(1, -(-size // BIG_FILE_BYTES))
+        memory = self.parse_memory_bytes or (2 * GIB if size > BIG_FILE_BYTES else known.memory_bytes)
         return Limits(address_space_bytes=memory, cpu_s=cpu_s, wall_s=10.0 + 4.0 * cpu_s, open_files=OPEN_FILES, network=False)

@@ -13,6 +13,7 @@ from map3d.catalogue import AssetRecord, Catalogue, SceneCrs, SceneRecord, Works
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.cores import usable_cores
 from map3d.errors import CrsError, ImportFailed, LimitExceeded, Map3dError, SubprocessDied, SubprocessTimedOut
+from map3d.formats import find_format
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
 from map3d.ingest.content import find_content
 from map3d.ingest.import_inputs import ImportInputs, import_inputs
@@ -20,7 +21,6 @@ from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.import_pieces import import_pieces, pieces_key
 from map3d.ingest.import_progress import ImportProgress
 from map3d.ingest.parser_process import ParserProcess
-from map3d.ingest.referenced_files import find_missing_files
 from map3d.ingest.relief_grids import AS_TERRAIN, Grid
 from map3d.ingest.scene_crs import LOCAL
 from map3d.ingest.sources import SourceDocument
@@ -29,8 +29,6 @@ from map3d.registry import Registry
 from map3d.subprocess import Failure, Limits
 from map3d.types import Box, Vec3
 
-PARSER_ENTRIES: Final = {"raster": "map3d.ingest.terrain.parse_terrain:open_terrain_parser"}
-DOCUMENT_PARSER_ENTRY: Final = "map3d.ingest.parse_document:open_document_parser"
 ORIGIN_STEP_M: Final = 100.0
 MAX_MISSING_NAMES: Final = 200
 OTHER_LODS: Final = "nothing at the requested level of detail"
@@ -92,8 +90,7 @@ def import_file(
     try:
         with _pieces(record, source, final, inputs) as pieces:
             with parser or ParserProcess() as running:
-                parser_entry = entry or PARSER_ENTRIES.get(source.format, DOCUMENT_PARSER_ENTRY)
-                parsed = _parse(record, source, options, draft, pieces, progress, running, parser_entry)
+                parsed = _parse(record, source, options, draft, pieces, progress, running, entry or find_format(source.format).parser)
             report = parsed["report"]
             if not report["triangles"] and report.get("grids"):
                 raise OnlyGrids(f"{source.paths[0]}: {AS_TERRAIN}", report["grids"])
@@ -108,8 +105,8 @@ def import_file(
 
 
 def _pieces(record: SceneRecord, source: SourceDocument, final: Path, inputs: ImportInputs) -> AbstractContextManager[Path | None]:
-    """Returns the folder for the pieces of an import of rasters; None for other formats."""
-    if source.format != "raster":
+    """Returns the folder for the pieces of an import; None for a format that is imported as a whole."""
+    if not find_format(source.format).in_pieces:
         return nullcontext()
     options = {name: value for name, value in inputs.options.items() if name not in _NOT_IN_PIECES}
     paths = [str(path.absolute()) for path in source.paths]
@@ -201,15 +198,13 @@ def workspace_key(workspace: Workspace) -> str:
 def _folder_options(source: SourceDocument) -> dict[str, Any]:
     """Returns the folder in which the reader opens files that the document names, by default the document's own, and the files in it that have
     appearances for the document."""
-    folder = {} if source.root is None or source.format == "raster" else {"folder": str(source.root.absolute())}
+    folder = {"folder": str(source.root.absolute())} if source.root is not None and find_format(source.format).names_files else {}
     return folder | ({"appearance_files": [str(path.absolute()) for path in source.appearances]} if source.appearances else {})
 
 
 def _missing_files(source: SourceDocument) -> dict[str, Any]:
     """Returns the first names of missing files, and how many of the images are missing."""
-    if source.format == "raster":
-        return {}
-    found = find_missing_files(source.paths[0], source.root)
+    found = find_format(source.format).find_missing(source.paths[0], source.root)
     textures = {"textures": {"images": found.images, "missing": found.missing_images}} if found.images else {}
     return textures | ({"missing_files": found.names[:MAX_MISSING_NAMES]} if found.names else {})
 

@@ -52,7 +52,7 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
     counts = json.loads(writer.finish(reader))
     if unplaced:
         counts["skipped"] = {**counts.get("skipped", {}), _UNPLACED: unplaced}
-    hints = extent.hints(request["path"]) if request["format"] == "obj" and request["reader"].get("up") == "z" else []
+    hints = extent.hints(request["path"]) if request["reader"].get("up") == "z" else []
     report = reprojector.report(counts)
     report["warnings"] += hints
     grids = json.loads(reader.grids())

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from map3d.errors import UnknownFormat
-from map3d.ingest.formats import detect_format
+from map3d.formats.detect import detect_format
+from map3d.formats.raster import RASTER
 from map3d.ingest.sources import SourceDocument, find_sources
 
 Grid = Mapping[str, Any]
@@ -38,7 +39,7 @@ class ReliefGrids:
         missing, failed = [], []
         for file in self._grids:
             try:
-                if file in found or detect_format(file) == "raster":
+                if file in found or detect_format(file) is RASTER:
                     missing += [file] if file not in found else []
                 else:
                     failed.append((str(file), "a RasterRelief names it as its raster, but it is none"))

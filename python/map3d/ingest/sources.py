@@ -11,26 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from map3d.errors import NotFound, UnknownFormat
-from map3d.ingest.document_links import DocumentLinks, find_document_links, find_geometry_documents
-from map3d.ingest.formats import RASTER_FORMATS, READABLE_FORMATS, Format, check_stored, detect_format, has_world_file
-from map3d.ingest.gzip_file import unpacked_path
-from map3d.ingest.referenced_files import find_code_lists, find_referenced_files
+from map3d.formats import FORMATS, find_format
+from map3d.formats.detect import READABLE_FORMATS, check_stored, detect_format
+from map3d.formats.gzip_file import unpacked_path
+from map3d.formats.raster import RASTER
+from map3d.formats.source_format import DocumentLinks, SourceFormat
 from map3d.ingest.virtual_raster import find_virtual_sources, is_virtual
 
-_COMPANION_SUFFIXES = (
-    ".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".txt", ".md", ".json", ".pdf", ".html", ".prj", ".xsd", ".sqlite",
-    *(suffix for format in RASTER_FORMATS for suffix in format.world_files),
-)  # fmt: skip
+_COMPANION_SUFFIXES = {".txt", ".md", ".json", ".pdf", ".html", ".sqlite", *(suffix for format in FORMATS for suffix in format.companions)}
 _DOCUMENT_NAMES = ("license", "licence", "copying", "notice", "readme", "authors", "changelog", "changes")
 """Files that begin so and have no suffix accompany data, too."""
-_SOURCE_SUFFIXES = (".gml", ".citygml", ".obj", *(suffix for format in RASTER_FORMATS for suffix in format.suffixes))
+_SOURCE_SUFFIXES = {suffix for format in FORMATS for suffix in format.suffixes}
 """Files with these suffixes are reported if they are unreadable."""
-_CODE_LIST_SUFFIXES = (".xml", ".gml")
-
 _NO_LINKS = DocumentLinks(frozenset(), frozenset(), has_objects=True)
-
-_ORDER: Mapping[Format, int] = {"citygml": 0, "obj": 1, "raster": 2}
-"""CityGML files name the CRS of the scene, which OBJ files and rasters may lack."""
 
 OnUnreadable = Callable[[Path, str], None]
 """Called with an unreadable file of a folder and the reason."""
@@ -48,7 +41,7 @@ class SourceDocument:
     given with it whose appearances target its surfaces. `grids`: rasters that RasterReliefs name, and where these say that they are."""
 
     name: str
-    format: Format
+    format: str
     paths: tuple[Path, ...]
     root: Path | None = None
     virtual: bool = False
@@ -77,7 +70,7 @@ def find_sources(
     taken: Collection[str] = (),
     removed: Mapping[str, Path] | None = None,
 ) -> list[SourceDocument]:
-    """Returns the given files, and every file of a known format below the given folders: CityGML, OBJ, then rasters, each by path.
+    """Returns the given files, and every file of a known format below the given folders, in the order of the formats, each by path.
 
     The rasters below a given folder are one source, named after the folder that holds them all; those given one by one are one source, named after
     the first.
@@ -93,23 +86,24 @@ def find_sources(
     Raises UnknownFormat for a given file of unknown format and for a folder without any readable file; NotFound.
     """
     documents: list[_Group] = []
-    terrains: list[_Group] = []
-    rasters: list[Path] = []
+    grouped: list[_Group] = []
+    given: dict[str, list[Path]] = {}
     for path in paths:
         if path.is_dir():
             found = _search_folder(path, on_unreadable or (lambda *_: None), on_left_alone or (lambda *_: None), virtual=path in virtual)
-            documents += [_Group(unpacked_path(file).stem, format, (file,), path) for file, format in found if format != "raster"]
-            terrains += _group_rasters([file for file, format in found if format == "raster"], path if path in virtual else None)
+            documents += [_Group(unpacked_path(file).stem, format, (file,), path) for file, format in found if not format.is_grouped]
+            grouped += _group_files(found, path, virtual=path in virtual)
         elif not path.exists():
             raise NotFound(f"{path}: no such file or folder")
-        elif (format := detect_format(path, virtual=path in virtual)) == "raster":
-            rasters.append(path)
+        elif (format := detect_format(path, virtual=path in virtual)).is_grouped:
+            given.setdefault(format.name, []).append(path)
         else:
             documents.append(_Group(unpacked_path(path).stem, format, (path,)))
-    if rasters:
-        terrains.append(_Group(rasters[0].stem, "raster", tuple(rasters), virtual=any(path in virtual for path in rasters)))
-    sources = _name_sources([*_link(documents), *terrains], name, _AssetNames(known or {}, taken, removed or {}))
-    return sorted(sources, key=lambda source: _ORDER[source.format])
+    for of_format, files in given.items():
+        grouped.append(_Group(files[0].stem, find_format(of_format), tuple(files), virtual=any(path in virtual for path in files)))
+    sources = _name_sources([*_link(documents), *grouped], name, _AssetNames(known or {}, taken, removed or {}))
+    order = [format.name for format in FORMATS]
+    return sorted(sources, key=lambda source: order.index(source.format))
 
 
 def source_digest(source: SourceDocument) -> str:
@@ -127,16 +121,18 @@ def source_digest(source: SourceDocument) -> str:
     return total.hexdigest()[:32]
 
 
-def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_left_alone: OnUnreadable, *, virtual: bool = False) -> list[tuple[Path, Format]]:
-    found: list[tuple[Path, Format]] = []
+def _search_folder(
+    folder: Path, on_unreadable: OnUnreadable, on_left_alone: OnUnreadable, *, virtual: bool = False
+) -> list[tuple[Path, SourceFormat]]:
+    found: list[tuple[Path, SourceFormat]] = []
     unknown: list[tuple[Path, str]] = []
     for path in sorted(path for path in _walk(folder) if path.exists() and not path.name.startswith(".")):
         if not path.suffix and path.name.lower().startswith(_DOCUMENT_NAMES):
             continue
         if path.suffix.lower() in _COMPANION_SUFFIXES:
             head = _read_head(path) if path.is_file() else b""
-            if has_world_file(path, head):
-                found.append((path, "raster"))
+            if (known := next((format for format in FORMATS if format.detect_companion(head, path)), None)) is not None:
+                found.append((path, known))
             elif path.suffix.lower() == ".json" and b'"CityJSON' in head:
                 unknown.append((path, "CityJSON; convert it to CityGML with citygml-tools"))
             continue
@@ -158,18 +154,17 @@ def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_left_alone: OnU
     return _without_named(found, folder) if virtual else found
 
 
-def _without_named(found: Sequence[tuple[Path, Format]], folder: Path) -> list[tuple[Path, Format]]:
+def _without_named(found: Sequence[tuple[Path, SourceFormat]], folder: Path) -> list[tuple[Path, SourceFormat]]:
     """Leaves out the rasters that a virtual raster of the folder names."""
-    named = {source for path, format in found if format == "raster" for source in find_virtual_sources(path, folder)}
-    return [(path, format) for path, format in found if format != "raster" or path.resolve() not in named]
+    named = {source for path, format in found if format is RASTER for source in find_virtual_sources(path, folder)}
+    return [(path, format) for path, format in found if format is not RASTER or path.resolve() not in named]
 
 
-def _used_documents(folder: Path, found: Sequence[tuple[Path, Format]], unknown: Sequence[Path]) -> set[Path]:
-    """Returns the code lists and libraries of geometry that the CityGML files of a folder name; they are read with these files."""
-    if not any(unpacked_path(path).suffix.lower() in _CODE_LIST_SUFFIXES for path in unknown):
-        return set()
-    documents = [path for path, format in found if format == "citygml"]
-    return {used for path in documents for used in find_code_lists(path, folder) | find_geometry_documents(path, folder)}
+def _used_documents(folder: Path, found: Sequence[tuple[Path, SourceFormat]], unknown: Sequence[Path]) -> set[Path]:
+    """Returns the files, such as code lists, that are no documents and are read with the documents of a folder."""
+    suffixes = {unpacked_path(path).suffix.lower() for path in unknown}
+    linked = [(path, format.links) for path, format in found if format.links is not None and suffixes.intersection(format.links.used_suffixes)]
+    return {used for path, links in linked for used in links.find_used(path, folder)}
 
 
 def _read_head(path: Path) -> bytes:
@@ -195,7 +190,7 @@ class _Group:
     """Files of one source; `label`: the text from which its name is made."""
 
     label: str
-    format: Format
+    format: SourceFormat
     paths: tuple[Path, ...]
     root: Path | None = None
     virtual: bool = False
@@ -203,8 +198,8 @@ class _Group:
 
 
 def _link(documents: Sequence[_Group]) -> list[_Group]:
-    """Gives CityGML files the appearances that others have for them; leaves out files of folders that only serve others."""
-    links = {group.paths[0]: find_document_links(group.paths[0], group.root) for group in documents if group.format == "citygml"}
+    """Gives documents the appearances that others have for them; leaves out files of folders that only serve others."""
+    links = {group.paths[0]: group.format.links.find_links(group.paths[0], group.root) for group in documents if group.format.links is not None}
     if not any(found.geometry or found.targets for found in links.values()):
         return list(documents)
     used = {path for found in links.values() for path in found.geometry | found.targets}
@@ -223,13 +218,17 @@ def _link(documents: Sequence[_Group]) -> list[_Group]:
     return linked
 
 
-def _group_rasters(rasters: Sequence[Path], virtual: Path | None) -> list[_Group]:
-    """Returns the rasters of a folder as one source: an elevation model and a photo belong together, and tiles make a mosaic. `virtual`: the folder,
-    if virtual rasters are read."""
-    if not rasters:
-        return []
-    folder = Path(os.path.commonpath([path.parent for path in rasters]))
-    return [_Group(rasters[0].stem if len(rasters) == 1 else folder.resolve().name, "raster", tuple(rasters), virtual, virtual is not None)]
+def _group_files(found: Sequence[tuple[Path, SourceFormat]], root: Path, *, virtual: bool) -> list[_Group]:
+    """Returns the files of a folder in each format that is grouped as one source: an elevation model and a photo belong together, and tiles make a
+    mosaic. `virtual`: virtual rasters are read."""
+    groups = []
+    for format in (format for format in FORMATS if format.is_grouped):
+        files = [path for path, of_format in found if of_format is format]
+        if files:
+            folder = Path(os.path.commonpath([path.parent for path in files]))
+            label = files[0].stem if len(files) == 1 else folder.resolve().name
+            groups.append(_Group(label, format, tuple(files), root if virtual else None, virtual))
+    return groups
 
 
 class _AssetNames:
@@ -270,7 +269,7 @@ def _name_sources(groups: Sequence[_Group], name: str | None, names: _AssetNames
         possible = _possible_names(group, wanted[position], with_folders=_is_given(group) or wanted[position] in absent)
         unique = kept.get(position) or next(_free(possible, wanted[position], used, group, None if name else names))
         used.add(unique)
-        sources.append(SourceDocument(unique, group.format, group.paths, group.root, group.virtual, group.appearances))
+        sources.append(SourceDocument(unique, group.format.name, group.paths, group.root, group.virtual, group.appearances))
     return sources
 
 
@@ -283,7 +282,7 @@ def _free(possible: Iterator[str], wanted: str, used: Collection[str], group: _G
 
 def _is_given(group: _Group) -> bool:
     """Returns whether the group is a document that was given itself."""
-    return group.root is None and group.format != "raster"
+    return group.root is None and not group.format.is_grouped
 
 
 def _possible_names(group: _Group, wanted: str, *, with_folders: bool) -> Iterator[str]:
@@ -299,7 +298,7 @@ def _possible_names(group: _Group, wanted: str, *, with_folders: bool) -> Iterat
 def _folder_of(group: _Group) -> Path:
     """Returns the folder that holds the file or, of rasters that are named after their folder, that folder."""
     folder = group.paths[0].absolute().parent
-    if group.label == group.paths[0].stem or group.format != "raster":
+    if group.label == group.paths[0].stem or not group.format.is_grouped:
         return folder
     return Path(os.path.commonpath([path.absolute().parent for path in group.paths])).parent
 
@@ -320,7 +319,7 @@ def _kept_names(groups: Sequence[_Group], wanted: Sequence[str], names: _AssetNa
         if known_name not in names.of_others(group)
         if (equal := _equal_parts(group.paths[0], path)) >= (_REMOVED_PARTS if known_name in removed else 1)
     ]
-    rasters = {path.absolute(): position for position, group in enumerate(groups) if group.format == "raster" for path in group.paths}
+    rasters = {path.absolute(): position for position, group in enumerate(groups) if group.format.is_grouped for path in group.paths}
     pairs += [(-len(path.parts), False, rasters[path], known_name) for known_name, path in names.known.items() if path in rasters]
     kept: dict[int, str] = {}
     for _, _, position, known_name in sorted(pairs):
@@ -350,11 +349,12 @@ def asset_name(text: str) -> str:
 def _find_companions(path: Path, source: SourceDocument) -> list[Path]:
     beside = {other.resolve() for other in path.parent.glob(f"{_escape_glob(unpacked_path(path).stem)}.*") if other.is_file()}
     documents = {other.resolve() for other in source.appearances}
-    if source.format == "citygml":
-        documents |= find_geometry_documents(path, source.root)
+    format = find_format(source.format)
+    if format.links is not None:
+        documents |= format.links.find_geometry_documents(path, source.root)
     folder = path.parent if source.root is None else source.root
-    referenced = {file for other in documents for file in find_referenced_files(other, folder)}
-    return sorted((beside | find_referenced_files(path, source.root) | documents | referenced) - {path.resolve()})
+    referenced = {file for other in documents for file in format.find_files(other, folder)}
+    return sorted((beside | format.find_files(path, source.root) | documents | referenced) - {path.resolve()})
 
 
 def _escape_glob(stem: str) -> str:

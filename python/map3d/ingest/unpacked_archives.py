@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Final
 
 from map3d.catalogue import Workspace
+from map3d.formats.archive_limits import ArchiveLimits
 from map3d.ingest.unfinished_imports import draft_path, remove_dead_drafts
-from map3d.ingest.zip_archive import ArchiveLimits, is_zip, unpack
+from map3d.ingest.zip_archive import is_zip, unpack
 
 NAME: Final = "_archives"
 """No name of an asset. The folder is a draft of this process: a later import removes it if this one is killed."""

@@ -11,7 +11,7 @@ from typing import Final
 from xml.etree.ElementTree import Element, ParseError, XMLParser
 
 from map3d.errors import ImportFailed
-from map3d.ingest.formats import RASTER_FORMATS, find_raster_format, is_virtual_raster
+from map3d.formats.raster import RASTER_FORMATS, find_raster_format, is_virtual_raster
 
 MAX_BYTES: Final = 256_000_000
 MAX_DEPTH: Final = 8

@@ -8,11 +8,12 @@ import stat
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 from map3d.errors import ImportFailed, LimitExceeded, Map3dError, SubprocessDied
+from map3d.formats.archive_limits import ArchiveLimits
 from map3d.subprocess import Failure, Handler, Limits, Subprocess
 
 _SIGNATURE: Final = b"PK\x03\x04"
@@ -23,17 +24,6 @@ _MEMORY_BYTES: Final = 1 << 30
 _START_S: Final = 60.0
 _DAMAGE: Final = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OSError, ValueError, RuntimeError)
 """What Python's zipfile raises for damaged and encrypted archives and for unknown methods of compression."""
-
-
-@dataclass(frozen=True)
-class ArchiveLimits:
-    """`ratio`: unpacked per packed byte of an entry, checked once `ratio_from_bytes` are unpacked; `name_bytes`: of an entry's whole name."""
-
-    entries: int = 200_000
-    bytes: int = 50_000_000_000
-    ratio: int = 200
-    ratio_from_bytes: int = 1 << 20
-    name_bytes: int = 1_024
 
 
 def is_zip(path: Path) -> bool:

@@ -10,7 +10,8 @@ from typing import Final
 
 from map3d.catalogue import Workspace
 from map3d.errors import BadRequest, NotFound
-from map3d.ingest.zip_archive import ArchiveLimits, is_zip, unpack
+from map3d.formats.archive_limits import ArchiveLimits
+from map3d.ingest.zip_archive import is_zip, unpack
 from map3d.uploads import Uploads
 from map3d.uploads.uploads import DATA
 

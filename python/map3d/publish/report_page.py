@@ -5,6 +5,7 @@ from html import escape
 from pathlib import Path
 from typing import Final
 
+from map3d.formats import title_of
 from map3d.publish.page_head import MAX_TITLE, add_policy, cut
 from map3d.quantities import plural, size_text, time_text
 from map3d.registry import ObjectKind
@@ -189,7 +190,7 @@ def _textures(file: FileContents) -> str:
 
 def _format_text(file: FileContents) -> str:
     if file.rasters is None:
-        return {"citygml": "CityGML", "obj": "OBJ"}.get(file.format, file.format)
+        return title_of(file.format)
     counts = ((file.rasters.elevation, "elevation"), (file.rasters.imagery, "imagery"))
     return " and ".join(f"{plural(count, 'raster')} of {what}" for count, what in counts if count)
 

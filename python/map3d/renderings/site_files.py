@@ -9,6 +9,7 @@ from pathlib import Path
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
+from map3d.formats.raster import RASTER
 from map3d.ingest.asset_removal import remove_assets, removed_files
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
@@ -77,7 +78,7 @@ class _Update:
         self._summary.elsewhere.extend(name for name, asset in self._assets.items() if not self._is_inside(asset) and name not in _names(sources))
         with ParserProcess() as parser:
             for number, found in enumerate(sources):
-                source = self._with_grids(found) if found.format == "raster" and self._grids.is_waiting else found
+                source = self._with_grids(found) if found.format == RASTER.name and self._grids.is_waiting else found
                 show = partial(report, source.paths[0].name, number, len(sources))
                 show("")
                 self._import_if_changed(source, parser, show)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from map3d.catalogue import AssetRecord
+from map3d.formats import title_of
 from map3d.web.page_tools import translate as _
 from map3d.web.report_sentences import fault_sentence, skip_sentence
 
@@ -20,7 +21,7 @@ class ReportLine:
 
 @dataclass(frozen=True)
 class AssetSummary:
-    """An imported file in a list."""
+    """An imported file in a list. `format`: the title of its format."""
 
     name: str
     source: str
@@ -35,7 +36,7 @@ def summary_of(asset: AssetRecord) -> AssetSummary:
     noted = sum(warning["count"] for warning in report.get("warnings", ()) if not warning["reason"].startswith("skipped: "))
     problems = sum(report.get("skipped", {}).values()) + noted
     source = asset.source.rsplit("/", 1)[-1]
-    return AssetSummary(asset.name, source, asset.format, report.get("objects", 0), report.get("triangles", 0), problems)
+    return AssetSummary(asset.name, source, title_of(asset.format), report.get("objects", 0), report.get("triangles", 0), problems)
 
 
 def missing_files(asset: AssetRecord) -> list[str]:

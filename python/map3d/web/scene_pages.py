@@ -10,6 +10,7 @@ from werkzeug.datastructures import MultiDict
 
 from map3d.catalogue import AssetRecord, RenderingRecord, SceneRecord
 from map3d.errors import BadRequest, CrsError, Map3dError, NotFound
+from map3d.formats import FORMATS
 from map3d.publish.published_folders import folders_of
 from map3d.renderings.build import is_stale
 from map3d.renderings.create_scene import create_scene
@@ -22,6 +23,7 @@ from map3d.web.document_routes import catalogue, workspace
 from map3d.web.forms import form_values, more_controls
 from map3d.web.operation_words import show_all
 from map3d.web.outlier_words import outlier_words
+from map3d.web.page_tools import translate
 from map3d.web.report_words import missing_files, placing_words, report_lines, summary_of
 from map3d.web.studio import ask, check_typed_name, folder_choice, go_to, page
 
@@ -37,7 +39,7 @@ MAX_IMPORT_BYTES: Final = 2 << 20
 def home() -> Response:
     operations = show_all(catalogue().operations(limit=OPERATIONS))
     scenes = [_listed(scene) for scene in catalogue().scenes()]
-    return page("home.html", scenes=scenes, operations=operations, running=any(one.is_open for one in operations))
+    return page("home.html", formats=_formats(), scenes=scenes, operations=operations, running=any(one.is_open for one in operations))
 
 
 @scene_pages.get("/scenes/new")
@@ -71,7 +73,8 @@ def scene_page(scene: str) -> Response:
     values: dict[str, Any] = {"scene": record, "assets": assets, "operations": operations, "running": any(one.is_open for one in operations)}
     far = outlier_words(read_outliers(workspace(), scene), record) if assets else None
     stale = bool(assets) and is_stale(workspace(), catalogue(), scene)
-    return page("scene.html", **values, renderings=_listed_renderings(scene), stale=stale, far=far, more=more_controls(AddFiles, MultiDict()))
+    more = more_controls(AddFiles, MultiDict())
+    return page("scene.html", **values, formats=_formats(), renderings=_listed_renderings(scene), stale=stale, far=far, more=more)
 
 
 @scene_pages.post("/scenes/<scene>/import")
@@ -133,6 +136,10 @@ def send_remove(scene: str) -> Response:
         return _removal_page(scene, str(error), 400)
     ask("remove", scene, what="scene", with_renderings=True, folders=request.form.getlist("published"))
     return go_to("studio/")
+
+
+def _formats() -> str:
+    return ", ".join(translate(format.uploads) for format in FORMATS)
 
 
 def _choice(form: Mapping[str, str]) -> dict[str, Any]:

@@ -42,7 +42,7 @@ impl FileHead {
             if let Some(comment) = rest.strip_prefix("!--") {
                 rest = &comment[comment.find("-->")?..];
             } else if !rest.starts_with(['!', '?']) {
-                let name = rest.split(|c: char| c.is_whitespace() || c == '>' || c == '/').next()?;
+                let name = rest.split(|c: char| !c.is_alphanumeric() && !"_-.:".contains(c)).next()?;
                 return name.rsplit(':').next().filter(|name| !name.is_empty());
             }
         }

@@ -12,8 +12,8 @@ from pyproj.exceptions import CRSError as ProjError
 from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
 from map3d.errors import CrsError, ImportFailed, NotFound
+from map3d.formats.raster import RASTER_FORMATS, VIRTUAL_DRIVER, VIRTUAL_REFUSED, find_raster_format, is_virtual_raster
 from map3d.geometry.crs import horizontal_crs, is_local, parse_crs
-from map3d.ingest.formats import RASTER_FORMATS, VIRTUAL_DRIVER, VIRTUAL_REFUSED, find_raster_format, is_virtual_raster
 from map3d.ingest.virtual_raster import is_checked
 
 Array = NDArray[np.float64]

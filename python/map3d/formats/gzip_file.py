@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from map3d.errors import LimitExceeded
-from map3d.ingest.zip_archive import ArchiveLimits
+from map3d.formats.archive_limits import ArchiveLimits
 
 _SIGNATURE: Final = b"\x1f\x8b"
 _PART_BYTES: Final = 1 << 20

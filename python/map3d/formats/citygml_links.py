@@ -10,8 +10,9 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from map3d.ingest.gzip_file import content_windows, is_gzip
-from map3d.ingest.referenced_files import FileNames
+from map3d.formats.file_names import FileNames
+from map3d.formats.gzip_file import content_windows, is_gzip
+from map3d.formats.source_format import DocumentLinks
 
 MAX_CHAIN: Final = 16
 """Longest chain of references that the reader follows."""
@@ -20,16 +21,6 @@ _SUFFIXES: Final = (b"ml#", b"ML#", b".gz#", b".GZ#")
 """Ends of the names of other documents, with the sign before the id: .gml, .xml, .citygml."""
 _DELIMITERS: Final = (b'"', b"'", b">")
 _OBJECT_MEMBERS: Final = (b"bjectMember", b"eatureMember")
-
-
-@dataclass(frozen=True)
-class DocumentLinks:
-    """`geometry`: documents to whose elements this one refers by XLink; `targets`: those whose surfaces its appearances target. `has_objects`: the
-    document has city objects of its own."""
-
-    geometry: frozenset[Path]
-    targets: frozenset[Path]
-    has_objects: bool
 
 
 def find_document_links(path: Path, root: Path | None = None) -> DocumentLinks:

@@ -1,0 +1,73 @@
+"""CityGML, as its row in the list of formats. The core detects and reads it."""
+
+import re
+from collections.abc import Iterator, Sequence
+from mmap import mmap
+from pathlib import Path
+from typing import Final
+
+from map3d import _core
+from map3d.formats.citygml_links import find_document_links, find_geometry_documents
+from map3d.formats.file_names import MAX_NAME_BYTES, FileNames, existing_files, match, missing, names_in
+from map3d.formats.source_format import LinkedDocuments, MissingFiles, SourceFormat
+
+_NAME: Final = "citygml"
+# Every pattern is bounded or excludes what follows it, so that a hostile file costs no more than its length.
+_TAGS: Final = (b"imageURI>", b"textureMap>", b"libraryObject>", b"fileName>", b"fileReference>")
+_IMAGE_TAGS: Final = _TAGS[:2]
+_CODE_LIST: Final = re.compile(rb"""codeSpace=["']([^"'<>]{1,4096}\.(?:xml|gml))["']""", re.IGNORECASE)
+
+
+def _find_files(path: Path, root: Path | None = None) -> set[Path]:
+    return set(existing_files(path, _find_elements, [FileNames.of(path, root)])) | _find_code_lists(path, root)
+
+
+def _find_code_lists(path: Path, root: Path | None = None) -> set[Path]:
+    """Returns the dictionaries of codes that a document names."""
+    return set(existing_files(path, match(_CODE_LIST), [FileNames.of(path, root)]))
+
+
+def _find_missing(path: Path, root: Path | None = None) -> MissingFiles:
+    folders = [FileNames.of(path, root)]
+    images, missing_images = names_in(path, _find_images), missing(path, _find_images, folders)
+    return MissingFiles(sorted(missing(path, _find_elements, folders)), len(images), len(missing_images))
+
+
+def _find_used(path: Path, root: Path | None = None) -> set[Path]:
+    """Returns the code lists and libraries of geometry that a document names; they are read with it."""
+    return _find_code_lists(path, root) | find_geometry_documents(path, root)
+
+
+def _find_images(text: mmap | bytes) -> Iterator[bytes]:
+    return _find_elements(text, _IMAGE_TAGS)
+
+
+def _find_elements(text: mmap | bytes, tags: Sequence[bytes] = _TAGS) -> Iterator[bytes]:
+    """Yields the content of the elements that contain file names. It uses plain search, because city models are large and such elements rare."""
+    for tag in tags:
+        at = text.find(tag)
+        while at >= 0:
+            start = at + len(tag)
+            end = text.find(b"<", start, start + MAX_NAME_BYTES + 1)
+            if end > start and b">" not in (name := text[start:end]):
+                yield name
+            at = text.find(tag, start)
+
+
+CITYGML: Final = SourceFormat(
+    name=_NAME,
+    title="CityGML",
+    readable="CityGML (.gml, .xml)",
+    uploads="CityGML",
+    version=_core.READER_VERSIONS[_NAME],
+    detect=lambda head, _path: _core.detect_format(head) == _NAME,
+    parser="map3d.ingest.parse_document:open_document_parser",
+    suffixes=(".gml", ".citygml"),
+    companions=(".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".xsd"),
+    options=("theme", "lod", "transparency"),
+    sparse_options=("interiors",),
+    names_files=True,
+    find_files=_find_files,
+    find_missing=_find_missing,
+    links=LinkedDocuments(find_document_links, find_geometry_documents, _find_used, (".xml", ".gml")),
+)
