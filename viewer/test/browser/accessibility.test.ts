@@ -5,7 +5,7 @@ import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { renderTown } from "../fixture/rendering";
 import { THINGS } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 
 const bed = new TestBed({ town: renderTown(256, 0.38) });

@@ -5,7 +5,7 @@ import { ORIGIN, PLACE, THINGS } from "../fixture/town";
 import { lonLatFromLocal } from "../../src/geo/geographic";
 import type { Vec2, Vec3 } from "../../src/core/vec";
 import type * as Filters from "../../src/filter";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { settled, type Global } from "./page";
 

@@ -3,7 +3,7 @@ import type { Page } from "playwright-core";
 import { encodePng } from "../fixture/encodePng";
 import { renderRamp, renderTown, type Fixture } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
 

@@ -1,10 +1,10 @@
 import { expect, test } from "vitest";
 import type { Page } from "playwright-core";
 import type * as Compare from "../../src/compare";
-import { renderLater } from "../fixture/later";
+import { renderLater } from "../fixture/secondEpoch";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
 

@@ -1,10 +1,9 @@
 import { expect, test } from "vitest";
 import type { Page } from "playwright-core";
 import { renderTown } from "../fixture/rendering";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
-import { decoded } from "./hand";
-import { settled, type Global } from "./page";
+import { decoded, settled, type Global } from "./page";
 
 const town = renderTown();
 const bed = new TestBed({ town, later: town });

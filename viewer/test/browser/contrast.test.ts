@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { renderTown } from "../fixture/rendering";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 
 const bed = new TestBed({ town: renderTown(256, 0.38), small: renderTown() });

@@ -3,7 +3,7 @@ import type { Page } from "playwright-core";
 import { withDataTiles } from "../fixture/encodeDataTile";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { picture, settled, type Global } from "./page";
 
 const town = renderTown();

@@ -4,7 +4,7 @@ import type * as Element from "../../src/element";
 import { renderTown } from "../fixture/rendering";
 import { lonLatFromLocal } from "../../src/geo/geographic";
 import { ORIGIN, PLACE } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 
 const bed = new TestBed({ town: renderTown() });

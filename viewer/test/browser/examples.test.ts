@@ -3,9 +3,9 @@ import { dirname, join } from "node:path";
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { published, writeFolder } from "../fixture/folder";
-import { renderLater } from "../fixture/later";
+import { renderLater } from "../fixture/secondEpoch";
 import { renderTown } from "../fixture/rendering";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { VIEWER } from "./package";
 

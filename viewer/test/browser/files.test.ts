@@ -5,7 +5,7 @@ import type { Page } from "playwright-core";
 import type * as Files from "../../src/files";
 import { published, writeFolder } from "../fixture/folder";
 import { renderTown } from "../fixture/rendering";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { pixels, type Global } from "./page";
 

@@ -7,7 +7,7 @@ import { computeAxes, localFromUvd } from "../../src/geo/axes";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN, trace } from "../fixture/town";
 import { makeFrame } from "../../src/geo/frame";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { placeOf } from "./level";
 import { settled, type Global } from "./page";

@@ -8,7 +8,7 @@ import { decodePng } from "../../src/core/png";
 import { renderTown } from "../fixture/rendering";
 import { differ, compareWithGolden, TOLERANCE } from "../fixture/golden";
 import { ORIGIN, type Place } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { settled, type Global } from "./page";
 

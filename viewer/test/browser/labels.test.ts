@@ -4,7 +4,7 @@ import type * as Labelled from "../../src/labels";
 import { lonLatFromLocal } from "../../src/geo/geographic";
 import { renderTown } from "../fixture/rendering";
 import { PLACE } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { settled, type Global } from "./page";
 

@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import { DAY, NOON, PATTERN, withBakedLight } from "../fixture/baked";
 import { renderTown } from "../fixture/rendering";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { cosine, decodedLevel, litByte, placeOf, spread, type Shares } from "./level";
 import { pixels, settled, type Global } from "./page";

@@ -4,7 +4,7 @@ import type * as Measure from "../../src/measure";
 import type { Vec3 } from "../../src/map3d";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import type { Global } from "./page";
 

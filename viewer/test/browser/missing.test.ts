@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import type { Global } from "./page";
 
 const bed = new TestBed({ town: renderTown() });

@@ -12,7 +12,7 @@ import { DEFAULT_LIGHT, towardsLight, type Light } from "../../src/geo/light";
 import { renderTown } from "../fixture/rendering";
 import { threeScript, triangleGltf } from "../fixture/three";
 import { ORIGIN, trace, type Hit, type Thing } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
 

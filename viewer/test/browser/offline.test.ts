@@ -4,7 +4,7 @@ import type * as Offline from "../../src/offline";
 import { withDataTiles } from "../fixture/encodeDataTile";
 import { published } from "../fixture/folder";
 import { renderTown } from "../fixture/rendering";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { pixels, type Global } from "./page";
 

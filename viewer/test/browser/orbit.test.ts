@@ -5,7 +5,7 @@ import { computeAxes } from "../../src/geo/axes";
 import { makeFrame } from "../../src/geo/frame";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN, trace } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
 

@@ -7,7 +7,7 @@ import { build as viteBuild, type Rolldown } from "vite";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { ENTRIES } from "../../scripts/entries.mjs";
 import { renderTown } from "../fixture/rendering";
-import { serve, TestBed } from "./bed";
+import { serve, TestBed } from "./testBed";
 import { Installation, VIEWER } from "./package";
 
 const town = renderTown();

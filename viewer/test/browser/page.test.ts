@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { devices, type Page } from "playwright-core";
 import { renderTown, type Fixture } from "../fixture/rendering";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 
 

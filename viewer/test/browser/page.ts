@@ -1,4 +1,5 @@
 import type { Page } from "playwright-core";
+import { decodePng, type DecodedPng } from "../../src/core/png";
 /** Functions that run in the page. map3d is the global of dist/map3d.js. */
 import type * as M from "../../src/map3d";
 
@@ -62,3 +63,6 @@ export async function picture(page: Page): Promise<Buffer> {
   });
   return Buffer.from(text, "base64");
 }
+
+/** Decodes a PNG file. */
+export const decoded = (png: Uint8Array): Promise<DecodedPng> => decodePng(Uint8Array.from(png));

@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import { devices, type Page } from "playwright-core";
 import { decodePng } from "../../src/core/png";
 import { renderTown } from "../fixture/rendering";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 
 // The page's tools, light and layout.

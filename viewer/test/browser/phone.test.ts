@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import { devices, type CDPSession, type Page } from "playwright-core";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { BARE, picture, type Global } from "./page";
 
@@ -16,8 +16,8 @@ type World = [number, number, number];
 const GROUND: World = [ORIGIN[0] + 10, ORIGIN[1] + 4, ORIGIN[2]];
 const ROOF: World = [ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34];
 
-/** Touch input. */
-class Hand {
+/** Fingers on the screen. */
+class TouchInput {
   constructor(private readonly page: Page, private readonly session: CDPSession) {}
 
   /** Puts fingers down, moves them by steps at the frame rate of a fast screen, and lifts them, however long the page takes. */
@@ -61,7 +61,7 @@ test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag,
     g.layer = new g.map3d.imageLayer(url).addTo(g.map);
     g.map.on("click", (event) => g.clicks.push(event)).once("idle", () => { done(); });
   }), [bed.url("town"), drawer] as const);
-  const hand = new Hand(page, session);
+  const touch = new TouchInput(page, session);
   expect(await page.evaluate(() => [(globalThis as Global).map.drawer, (globalThis as Global).map.canvas.width, (globalThis as Global).map.canvas.height])).toEqual([drawer, 780, 1688]);
   const shown = await picture(page);
   expect(shown.filter((value, k) => k % 4 === 3 && value === 255).length / (780 * 1688)).toBeGreaterThan(0.15);
@@ -70,12 +70,12 @@ test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag,
   // A drag that rests before the finger is lifted: the ground stays under it.
   const from = await placeOf(page, GROUND);
   const still = Array.from({ length: 9 }, () => [[from[0] + 60, from[1] - 80]] as const);
-  await hand.move([...steps(8, (part) => [[from[0] + 60 * part, from[1] - 80 * part]]), ...still]);
+  await touch.move([...steps(8, (part) => [[from[0] + 60 * part, from[1] - 80 * part]]), ...still]);
   const dragged = await placeOf(page, GROUND);
   expect(Math.hypot(dragged[0] - from[0] - 60, dragged[1] - from[1] + 80)).toBeLessThan(1.5);
 
   // A finger lifted in motion: inertia, then rest.
-  await hand.move(steps(8, (part) => [[300 - 120 * part, 400]]));
+  await touch.move(steps(8, (part) => [[300 - 120 * part, 400]]));
   const lifted = await placeOf(page, GROUND);
   await resting(page);
   const flung = await placeOf(page, GROUND);
@@ -87,14 +87,14 @@ test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag,
   await page.evaluate((at) => (globalThis as Global).map.setView(at, 2.4), GROUND);
   await resting(page);
   const [before, between] = [await zoomOf(page), await page.evaluate(() => (globalThis as Global).map.unproject([200, 420]) as World)];
-  await hand.move(steps(10, (part) => [[200 - 50 * (1 + part), 420], [200 + 50 * (1 + part), 420]]));
+  await touch.move(steps(10, (part) => [[200 - 50 * (1 + part), 420], [200 + 50 * (1 + part), 420]]));
   expect(await zoomOf(page)).toBeCloseTo(before + 1, 1);
   await resting(page);
   const stayed = await placeOf(page, between);
   expect(Math.hypot(stayed[0] - 200, stayed[1] - 420)).toBeLessThan(3);
 
   // Two fingers rotate by 40 degrees: the next direction, and back.
-  const turn = (sign: number): Promise<void> => hand.move(steps(10, (part) => {
+  const turn = (sign: number): Promise<void> => touch.move(steps(10, (part) => {
     const [dx, dy] = [80 * Math.cos(sign * part * 0.7), 80 * Math.sin(sign * part * 0.7)];
     return [[200 - dx, 420 - dy], [200 + dx, 420 + dy]];
   }));
@@ -110,7 +110,7 @@ test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag,
   await page.evaluate((at) => (globalThis as Global).map.setView(at, 2), ROOF);
   await resting(page);
   const roof = await placeOf(page, ROOF);
-  await hand.tap(roof);
+  await touch.tap(roof);
   await page.waitForFunction(() => (globalThis as Global).clicks.length > 0);
   const click = await page.evaluate(() => (({ id, position }) => ({ id, position }))((globalThis as Global).clicks[0] as Global["clicks"][0]));
   expect(click.id).toBe(17);
@@ -118,8 +118,8 @@ test.each(["webgl", "canvas"])("%s: on a slow phone the map opens; fingers drag,
   await page.waitForTimeout(400);
   // On a busy machine the second tap may come too late to make them one gesture.
   for (let tries = 0; tries < 5 && await zoomOf(page) < 2.5; tries++) {
-    await hand.tap(roof);
-    await hand.tap(roof);
+    await touch.tap(roof);
+    await touch.tap(roof);
     await page.waitForTimeout(1500);
   }
   await page.waitForFunction(() => (globalThis as Global).map.zoom > 2.95);

@@ -3,7 +3,7 @@ import type { BrowserContextOptions, Page } from "playwright-core";
 import type * as Portrayal from "../../src/portrayal";
 import { NOON, withBakedLight } from "../fixture/baked";
 import { renderTown } from "../fixture/rendering";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { pixels, type Global } from "./page";
 

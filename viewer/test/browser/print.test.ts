@@ -5,7 +5,7 @@ import type * as Print from "../../src/print";
 import { renderTown } from "../fixture/rendering";
 import { decodePng, type DecodedPng } from "../../src/core/png";
 import { ORIGIN } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
 

@@ -4,10 +4,9 @@ import { computeLevel } from "../../src/tiles/cover";
 import { makeFrame } from "../../src/geo/frame";
 import { renderPainted, type Paint } from "../fixture/rendering";
 import { compareTo, stitch, type Errors } from "../fixture/stitched";
-import { TestBed } from "./bed";
-import { decoded } from "./hand";
+import { TestBed } from "./testBed";
 import { cornerOf } from "./level";
-import { picture, settled, type Global } from "./page";
+import { decoded, picture, settled, type Global } from "./page";
 
 const [TILE, ZMAX] = [64, 3];
 const ZOOMS = Array.from({ length: 20 }, (_, k) => 1.53 + 0.1737 * k);

@@ -8,7 +8,7 @@ import { towardsLight } from "../../src/geo/light";
 import { withBakedLight } from "../fixture/baked";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN, trace, type Hit } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
 

@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import type * as Theme from "../../src/theme";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { decodedLevel, placeOf } from "./level";
 import { picture, settled, type Global } from "./page";

@@ -8,12 +8,13 @@ import { screenFromLocal, type Camera } from "../../src/geo/camera";
 import { computeDaylight } from "../../src/geo/daylight";
 import { towardsLight } from "../../src/geo/light";
 import type { DecodedPng } from "../../src/core/png";
-import { renderLater } from "../fixture/later";
+import { renderLater } from "../fixture/secondEpoch";
 import { renderTown, type Fixture } from "../fixture/rendering";
 import { BOX, framesOf, ORIGIN, PLACE, THINGS, trace } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
-import { decoded, Hand, MAX_ACTIONS, throttle } from "./hand";
+import { CountedActions, MAX_ACTIONS, throttle } from "./countedActions";
+import { decoded } from "./page";
 
 // Common tasks with a city model on a phone: each takes at most three actions after opening. MAP3D_CLOCK=1 takes a dense screen, slows the phone down and prints times.
 const CLOCK = process.env.MAP3D_CLOCK === "1";
@@ -37,7 +38,7 @@ function withYears(fixture: Fixture): Fixture {
 
 interface Opened {
   readonly page: Page;
-  readonly hand: Hand;
+  readonly actions: CountedActions;
   readonly problems: string[];
   /** Time until the tools can be used, ms. */
   readonly opened: number;
@@ -54,12 +55,12 @@ async function open(query = "", hash = ""): Promise<Opened> {
   await page.waitForFunction(() => location.hash.length > 5 && document.querySelector("#tools:not([hidden])"));
   const opened = performance.now() - begun;
   await page.waitForTimeout(1500);
-  return { page, hand: new Hand(page), problems, opened };
+  return { page, actions: new CountedActions(page), problems, opened };
 }
 
-async function end({ page, hand, problems, opened }: Opened, name: string): Promise<void> {
+async function end({ page, actions, problems, opened }: Opened, name: string): Promise<void> {
   const seconds = (ms: number): string => `${(ms / 1000).toFixed(1)} s`;
-  if (CLOCK && hand.begun !== undefined) console.info(`${name}: opened in ${seconds(opened)}, ${String(hand.count)} actions in ${seconds(performance.now() - hand.begun)}`);
+  if (CLOCK && actions.begun !== undefined) console.info(`${name}: opened in ${seconds(opened)}, ${String(actions.count)} actions in ${seconds(performance.now() - actions.begun)}`);
   await page.screenshot({ path: `${OUT}/task-${name}.png` });
   expect(problems).toEqual([]);
   await page.context().close();
@@ -84,10 +85,10 @@ const measured = async (page: Page): Promise<string> => {
 
 test("find an address", async () => {
   const opened = await open();
-  const { page, hand } = opened;
-  await hand.tap("#query");
-  await hand.type("chapel");
-  await hand.key("Enter");
+  const { page, actions } = opened;
+  await actions.tap("#query");
+  await actions.type("chapel");
+  await actions.key("Enter");
   await page.waitForSelector("#info:not([hidden])");
   expect(await page.locator("#info h2").textContent()).toBe("Chapel");
   await expect.poll(() => offMiddle(placeOf(page, [-28, 47, 20])), { timeout: 20_000 }).toBeLessThan(3);
@@ -97,10 +98,10 @@ test("find an address", async () => {
 
 test("the height of a roof above the ground", async () => {
   const opened = await open();
-  const { page, hand } = opened;
-  await hand.tap("#measure");
-  await hand.tap(placeOf(page, [-45, -30, 0]));
-  await hand.tap(placeOf(page, [-45, -4, 34]));
+  const { page, actions } = opened;
+  await actions.tap("#measure");
+  await actions.tap(placeOf(page, [-45, -30, 0]));
+  await actions.tap(placeOf(page, [-45, -4, 34]));
   const [, rise = ""] = (await measured(page)).split("↑");
   expect(Math.abs(number(rise) - 34)).toBeLessThan(PIXEL_M);
   await end(opened, "height");
@@ -108,10 +109,10 @@ test("the height of a roof above the ground", async () => {
 
 test("the area of a facade", async () => {
   const opened = await open();
-  const { page, hand } = opened;
-  await hand.tap("#measure");
-  await hand.tap("#measure-area");
-  await hand.tap(placeOf(page, [31, -46, 8]));
+  const { page, actions } = opened;
+  await actions.tap("#measure");
+  await actions.tap("#measure-area");
+  await actions.tap(placeOf(page, [31, -46, 8]));
   const text = await measured(page);
   expect(Math.abs(number(text) / (54 * 16) - 1)).toBeLessThan(0.02);
   expect(text).toMatch(/∠ 90°$/);
@@ -120,11 +121,11 @@ test("the area of a facade", async () => {
 
 test("turn to the back of a building", async () => {
   const opened = await open();
-  const { page, hand } = opened;
+  const { page, actions } = opened;
   expect(cameraOf(page).frame.id).toBe("0-45");
-  await hand.tap(placeOf(page, [-45, -4, 34]));
+  await actions.tap(placeOf(page, [-45, -4, 34]));
   await page.waitForSelector("#info:not([hidden])");
-  await hand.tap("#info .behind");
+  await actions.tap("#info .behind");
   await page.waitForFunction(() => location.hash.startsWith("#180-45/"));
   await expect.poll(() => offMiddle(placeOf(page, [-45, -4, 17])), { timeout: 20_000 }).toBeLessThan(3);
   expect(await page.locator("#info h2").textContent()).toBe("Town hall");
@@ -140,13 +141,13 @@ test("turn to the back of a building", async () => {
 
 test("share a view", async () => {
   const opened = await open();
-  const { page, hand } = opened;
-  await hand.tap(placeOf(page, [32, 26, 62]));
+  const { page, actions } = opened;
+  await actions.tap(placeOf(page, [32, 26, 62]));
   await page.waitForSelector("#info:not([hidden])");
-  await hand.tap("#share");
+  await actions.tap("#share");
   await page.waitForSelector("dialog[open] .share-qr");
   await page.screenshot({ path: `${OUT}/task-share-dialog.png` });
-  await hand.tap("#share-link-copy");
+  await actions.tap("#share-link-copy");
   expect(await page.locator("#share-link-copy").textContent()).toBe("Copied");
   expect(await page.inputValue("#share-embed")).toContain(`<iframe src="${page.url().replaceAll("&", "&amp;")}"`);
   const link = await page.evaluate(() => navigator.clipboard.readText());
@@ -164,21 +165,21 @@ test("share a view", async () => {
 
 test("compare two epochs", async () => {
   const opened = await open("&with=later");
-  const { page, hand } = opened;
+  const { page, actions } = opened;
   const slider = page.locator("#epochs input");
   await slider.waitFor();
   expect(await slider.getAttribute("aria-valuetext")).toBe("A small town");
   await page.screenshot({ path: `${OUT}/task-epochs-before.png` });
   const { x, y, width, height } = (await slider.boundingBox()) as { x: number; y: number; width: number; height: number };
-  await hand.drag([x + 10, y + height / 2], [x + width - 4, y + height / 2]);
+  await actions.drag([x + 10, y + height / 2], [x + width - 4, y + height / 2]);
   await page.waitForFunction(() => location.hash.includes("/epoch=1"));
   expect(await slider.getAttribute("aria-valuetext")).toBe("Ten years later");
   await page.waitForTimeout(1500);
   // The tower is gone, and a new school can be selected.
-  await hand.tap(placeOf(page, [-10, -20, 24]));
+  await actions.tap(placeOf(page, [-10, -20, 24]));
   await page.waitForSelector("#info:not([hidden])");
   expect(await page.locator("#info h2").textContent()).toBe("New school");
-  await hand.tap(placeOf(page, [32, 26, 62]));
+  await actions.tap(placeOf(page, [32, 26, 62]));
   await page.waitForFunction(() => document.querySelector("#info h2")?.textContent !== "New school" || document.querySelector("#info[hidden]"));
   expect(await page.locator("#info h2").textContent()).not.toBe("Tower");
   // The link shows the same epoch.
@@ -192,10 +193,10 @@ test("compare two epochs", async () => {
 
 test("compare four directions", async () => {
   const opened = await open();
-  const { page, hand } = opened;
+  const { page, actions } = opened;
   const { zoom } = cameraOf(page);
   const windows = (): Promise<number> => page.locator(".map3d").count();
-  await hand.tap("#compare");
+  await actions.tap("#compare");
   await expect.poll(() => page.locator(".map3d-facing").allTextContents(), { timeout: 20_000 }).toEqual(["Facing north", "Facing east", "Facing south", "Facing west"]);
   await page.waitForTimeout(2500);
   await page.screenshot({ path: `${OUT}/task-four.png` });
@@ -206,11 +207,11 @@ test("compare four directions", async () => {
     expect(await page.evaluate(([cx, cy]) => document.elementsFromPoint(cx, cy).some((node) => node.matches(".card, .end-compare")), [x + width / 2, y + height / 2] as const)).toBe(false);
   }
   // A tap in one of the maps selects; the others highlight the same object.
-  await hand.tap([WIDTH * 0.75, HEIGHT * 0.27]);
+  await actions.tap([WIDTH * 0.75, HEIGHT * 0.27]);
   await page.waitForSelector("#info:not([hidden])");
   await page.screenshot({ path: `${OUT}/task-four-selected.png` });
   await page.locator("#info .close").tap();
-  await hand.tap("#end-compare");
+  await actions.tap("#end-compare");
   expect([await windows(), await page.locator(".map3d-facing").count()]).toEqual([1, 0]);
   await expect.poll(() => cameraOf(page).zoom, { timeout: 20_000 }).toBeCloseTo(zoom, 2);
   await end(opened, "four-closed");
@@ -228,12 +229,12 @@ test("a missing epoch shows a message, and the page works without it", async () 
 
 test("read an attribute", async () => {
   const opened = await open();
-  const { page, hand } = opened;
-  await hand.tap(placeOf(page, [-45, -4, 34]));
+  const { page, actions } = opened;
+  await actions.tap(placeOf(page, [-45, -4, 34]));
   await page.waitForSelector("#info:not([hidden])");
   const rows = (number: number): Promise<Record<string, string | null | undefined>> => page.locator("#info dl").nth(number).evaluate((list) => Object.fromEntries([...list.querySelectorAll("dt")].map((name) => [name.textContent, name.nextElementSibling?.textContent])));
   expect(await rows(0)).toMatchObject({ Height: "34 m" });
-  await hand.tap("#info summary");
+  await actions.tap("#info summary");
   expect(await rows(1)).toMatchObject({ measuredHeight: "34", roofType: "3100", listed: "Yes" });
   await page.locator("#info dd").last().scrollIntoViewIfNeeded();
   expect(await page.locator("#info dd").last().isVisible()).toBe(true);
@@ -242,9 +243,9 @@ test("read an attribute", async () => {
 
 test("colour by year", async () => {
   const opened = await open();
-  const { page, hand } = opened;
-  await hand.tap("#more");
-  await hand.choose("#color-by", "yearOfConstruction");
+  const { page, actions } = opened;
+  await actions.tap("#more");
+  await actions.choose("#color-by", "yearOfConstruction");
   await page.waitForSelector("#legend button");
   await page.waitForTimeout(1500);
   const classes = await page.locator("#legend button").evaluateAll((buttons) => buttons.map((button) => {
@@ -267,14 +268,14 @@ test("colour by year", async () => {
 test("see the shadow at 17:00", async () => {
   const start = "#0-45/691000.0/5336000.0/500.0/1.30/t=2026-06-21T10:00Z";
   const opened = await open("", start);
-  const { page, hand } = opened;
+  const { page, actions } = opened;
   const slider = page.locator("#time");
   expect(await page.locator("#clock").textContent()).toBe("12:00");
   const { x, y, width, height } = (await slider.boundingBox()) as { x: number; y: number; width: number; height: number };
   const THUMB_PX = 22;
   const [dawn, dusk] = await slider.evaluate((input) => [Number((input as HTMLInputElement).min), Number((input as HTMLInputElement).max)] as const);
   const at = (hour: number): Vec2 => [x + THUMB_PX / 2 + ((width - THUMB_PX) * (hour - dawn)) / (dusk - dawn), y + height / 2];
-  await hand.drag(at(12), at(17));
+  await actions.drag(at(12), at(17));
   expect(await page.locator("#clock").textContent()).toBe("17:00");
   await page.waitForFunction(() => location.hash.includes("/t=2026-06-21T15:00Z"));
   const light = towardsLight(computeDaylight(new Date("2026-06-21T15:00:00Z"), PLACE));
@@ -304,19 +305,19 @@ test("see the shadow at 17:00", async () => {
 
 test("print, and save a picture", async () => {
   const opened = await open();
-  const { page, hand } = opened;
-  await hand.tap("#make-picture");
+  const { page, actions } = opened;
+  await actions.tap("#make-picture");
   await page.screenshot({ path: `${OUT}/task-picture.png` });
-  await hand.tap("#picture-print");
+  await actions.tap("#picture-print");
   await page.waitForFunction(() => document.title === "printed");
   const [width, height] = await page.locator("#sheet img").evaluate((image) => [(image as HTMLImageElement).naturalWidth, (image as HTMLImageElement).naturalHeight]);
   expect([width, height]).toEqual([WIDTH, HEIGHT]);
   expect(await page.locator("#sheet h1").textContent()).toBe("A small town");
   await end(opened, "print");
   const again = await open();
-  await again.hand.tap("#make-picture");
+  await again.actions.tap("#make-picture");
   const download = again.page.waitForEvent("download");
-  await again.hand.tap("#picture-save");
+  await again.actions.tap("#picture-save");
   const saved = await decoded(readFileSync(await (await download).path()));
   expect([saved.width, saved.height]).toEqual([WIDTH, HEIGHT]);
   const places = Array.from({ length: 400 }, (_, k) => Math.floor((k * WIDTH * HEIGHT) / 400) * saved.channels);
@@ -326,8 +327,8 @@ test("print, and save a picture", async () => {
 
 test("a fourth action fails", async () => {
   const opened = await open();
-  for (let k = 0; k < MAX_ACTIONS; k++) await opened.hand.key("Tab");
-  expect(() => opened.hand.key("Tab")).toThrow("4 actions");
+  for (let k = 0; k < MAX_ACTIONS; k++) await opened.actions.key("Tab");
+  expect(() => opened.actions.key("Tab")).toThrow("4 actions");
   await end(opened, "fourth");
 });
 

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import { renderNoise, renderTown } from "../fixture/rendering";
 import { ORIGIN } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { cosine, decodedLevel, litByte, placeOf, spread, type Shares } from "./level";
 import { pixels, settled, type Global } from "./page";

@@ -1,9 +1,9 @@
 import { writeFileSync } from "node:fs";
 import { afterAll, beforeAll, describe, expect, test } from "vitest";
 import { OUT } from "../browser/browser";
-import { serve } from "../browser/bed";
+import { serve } from "../browser/testBed";
 import { begin, type Global } from "../browser/page";
-import { renderLater } from "../fixture/later";
+import { renderLater } from "../fixture/secondEpoch";
 import { renderNoise, renderTown } from "../fixture/rendering";
 import { ORIGIN, type Place } from "../fixture/town";
 import { OTHER_BROWSERS } from "./browsers";

@@ -1,6 +1,5 @@
 import type { Page } from "playwright-core";
 import type { Vec2 } from "../../src/core/vec";
-import { decodePng, type DecodedPng } from "../../src/core/png";
 
 /** Maximum number of actions of a task after opening. */
 export const MAX_ACTIONS = 3;
@@ -8,7 +7,7 @@ export const MAX_ACTIONS = 3;
 const APART_MS = 600;
 
 /** A user whose actions are counted. */
-export class Hand {
+export class CountedActions {
   count = 0;
   /** When the first action began, ms. */
   begun: number | undefined;
@@ -64,6 +63,3 @@ export async function throttle(page: Page): Promise<void> {
   await session.send("Emulation.setCPUThrottlingRate", { rate: 4 });
   await session.send("Network.emulateNetworkConditions", { offline: false, latency: 40, downloadThroughput: 10e6 / 8, uploadThroughput: 2e6 / 8 });
 }
-
-/** Decodes a PNG file. */
-export const decoded = (png: Uint8Array): Promise<DecodedPng> => decodePng(Uint8Array.from(png));

@@ -3,7 +3,7 @@ import { published } from "../fixture/folder";
 import { renderRamp, renderTown, type Fixture } from "../fixture/rendering";
 import { encodePng } from "../fixture/encodePng";
 import { ORIGIN } from "../fixture/town";
-import { serve, TestBed } from "./bed";
+import { serve, TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { pixels, settled, type Global } from "./page";
 

@@ -3,7 +3,7 @@ import { uvdFromLocal } from "../../src/geo/axes";
 import { makeFrame, type Frame } from "../../src/geo/frame";
 import { renderTown, type Fixture } from "../fixture/rendering";
 import { ORIGIN, trace, type Hit, type Place, type Thing } from "../fixture/town";
-import { TestBed } from "./bed";
+import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
 
