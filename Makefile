@@ -69,6 +69,10 @@ demo: build ## generate a town, render it, serve it on a free port and print the
 
 test: test-rust test-python test-viewer test-browser ## run the tests that guard map3d's own laws, including those in a browser
 
+test-browsers: build ## test the viewer in Firefox and WebKitGTK, and with bundlers; skips browsers that are not installed, and says so
+	@status=0; tests/browsers.sh all || status=$$?; \
+	case $$status in 0) cd viewer && npx --no-install vitest run --config vitest.agreement.config.ts;; 3) ;; *) exit $$status;; esac
+
 test-rust:
 	cargo test --workspace --locked --exclude map3d-py --lib --tests -q
 
@@ -91,7 +95,7 @@ test-viewer: $(CACHE)/npm
 test-wheel: wheel ## install the wheel into an empty environment without Rust and Node.js, and run it
 	$(BIN)/python -m pytest -q -m wheel
 
-test-browser: build ## test in Chromium, Firefox and WebKitGTK; skips browsers that are not installed, and says so
+test-browser: build ## test in Chromium; skips the tests if it is not installed, and says so
 	@status=0; tests/browsers.sh || status=$$?; \
 	case $$status in 0) $(MAKE) --no-print-directory browser-suite;; 3) ;; *) exit $$status;; esac
 
@@ -99,12 +103,20 @@ browser-suite: build
 	cd viewer && npx --no-install vitest run --config vitest.browser.config.ts
 	$(BIN)/python -m pytest -q -m browser
 
+<<<<<<< HEAD
 test-all: test test-more ## run all tests: also agreement with programs of others, endurance and the wheel
 
 test-more: test-more-python test-wheel # what test-all runs beyond test
 
 test-more-python: build mongo-server
 	$(PYTEST) -m "(third_party or endurance) and not browser"
+=======
+test-browsers: build ## test in Firefox and WebKitGTK, and with bundlers; skips browsers that are not installed, and says so
+	@status=0; tests/browsers.sh all || status=$$?; \
+	case $$status in 0) cd viewer && npx --no-install vitest run --config vitest.agreement.config.ts;; 3) ;; *) exit $$status;; esac
+
+test-all: test test-browsers ## run all tests, including slow ones and those of agreement with other programs
+>>>>>>> dccf404 (test(viewer): other browsers and bundlers in make test-all; no second attempt for a failed test)
 
 faults: build ## kill, fill disks, fail system calls: every tile set must equal the undisturbed one (docs/reliability.md): 2 hours
 	$(BIN)/python -m tests.faults

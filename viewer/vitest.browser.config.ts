@@ -1,4 +1,7 @@
 import { defineConfig } from "vitest/config";
 
-// Files share fixtures (isolate: false), since rendering one takes seconds. On a busy machine a gesture may come out slower than it was meant: such a test has two more attempts.
-export default defineConfig({ test: { retry: 2, include: ["test/browser/**/*.test.ts", "test/browsers/**/*.test.ts"], environment: "node", isolate: false, testTimeout: 300_000, hookTimeout: 300_000, maxWorkers: 2 } });
+/** Files of a worker share one browser and rendered fixtures (`isolate: false`). A test that fails under load has a cause: there is no second attempt. */
+export const BROWSER_TESTS = { environment: "node", isolate: false, maxWorkers: 2, testTimeout: 120_000, hookTimeout: 120_000 } as const;
+
+/** The viewer in Chromium. */
+export default defineConfig({ test: { ...BROWSER_TESTS, include: ["test/browser/**/*.test.ts"] } });

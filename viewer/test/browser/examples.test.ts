@@ -3,11 +3,11 @@ import { dirname, join } from "node:path";
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { published, writeFolder } from "../fixture/folder";
+import { VIEWER } from "../fixture/installation";
 import { renderLater } from "../fixture/secondEpoch";
 import { renderTown } from "../fixture/rendering";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
-import { VIEWER } from "./package";
 
 const bed = new TestBed({ town: renderTown(), later: renderLater() });
 const FOLDER = join(VIEWER, "examples");
