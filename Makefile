@@ -13,7 +13,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python mongo-server test-viewer test-wheel test-browser browser-suite test-more test-more-python wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer bench-serve peers faults bless docs reference build clean tools
+.PHONY: help demo test test-all test-rust test-python mongo-server test-viewer test-wheel test-browser test-browsers browser-suite test-more test-more-python wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer bench-serve peers faults bless docs reference build clean tools
 
 help: ## list the targets
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -103,20 +103,12 @@ browser-suite: build
 	cd viewer && npx --no-install vitest run --config vitest.browser.config.ts
 	$(BIN)/python -m pytest -q -m browser
 
-<<<<<<< HEAD
 test-all: test test-more ## run all tests: also agreement with programs of others, endurance and the wheel
 
-test-more: test-more-python test-wheel # what test-all runs beyond test
+test-more: test-more-python test-browsers test-wheel # what test-all runs beyond test
 
 test-more-python: build mongo-server
 	$(PYTEST) -m "(third_party or endurance) and not browser"
-=======
-test-browsers: build ## test in Firefox and WebKitGTK, and with bundlers; skips browsers that are not installed, and says so
-	@status=0; tests/browsers.sh all || status=$$?; \
-	case $$status in 0) cd viewer && npx --no-install vitest run --config vitest.agreement.config.ts;; 3) ;; *) exit $$status;; esac
-
-test-all: test test-browsers ## run all tests, including slow ones and those of agreement with other programs
->>>>>>> dccf404 (test(viewer): other browsers and bundlers in make test-all; no second attempt for a failed test)
 
 faults: build ## kill, fill disks, fail system calls: every tile set must equal the undisturbed one (docs/reliability.md): 2 hours
 	$(BIN)/python -m tests.faults

@@ -7,8 +7,9 @@ import { renderTown } from "../fixture/rendering";
 import { THINGS } from "../fixture/town";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
+import { animationsEnd } from "./page";
 
-const bed = new TestBed({ town: renderTown(256, 0.38) });
+const bed = new TestBed({ town: renderTown(256, 0.38) }, { draws: false });
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const DEVICES = {
   desk: { viewport: { width: 1280, height: 800 } },
@@ -28,29 +29,24 @@ async function violations(page: Page): Promise<string[]> {
 }
 
 test.each(Object.entries(DEVICES))("%s: axe-core finds no violation of WCAG 2 A and AA on the page", async (device, context) => {
-  const { page } = await bed.openPage({ ...context, locale: "en-GB" });
-  await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
-  await page.waitForSelector("#tools:not([hidden])");
-  await page.waitForTimeout(1500);
+  const { page } = await bed.openReadyMade(bed.url("town"), { ...context, locale: "en-GB" });
   const found: Record<string, string[]> = {};
   const look = async (state: string): Promise<void> => {
+    await animationsEnd(page);
     await page.screenshot({ path: `${OUT}/axe-${device}-${state}.png` });
     found[state] = await violations(page);
   };
   await look("start");
   await page.locator("#more").click();
-  await page.waitForTimeout(400);
   await look("settings");
   await page.locator("#more").click();
   await page.evaluate((id) => { location.hash = `${location.hash.split("/id=")[0] ?? ""}/id=${String(id)}`; }, THINGS[1]?.id ?? 0);
   await page.waitForSelector("#info:not([hidden])");
-  await page.waitForTimeout(400);
   await look("card");
   await page.locator("#make-picture").click();
   await look("image");
   await page.keyboard.press("Escape");
   expect(found).toEqual({ start: [], settings: [], card: [], image: [] });
-  await page.context().close();
 });
 
 test("axe-core finds a control without a name", async () => {
@@ -59,5 +55,4 @@ test("axe-core finds a control without a name", async () => {
   await page.waitForSelector("#tools:not([hidden])");
   await page.evaluate(() => { document.querySelector("#tools")?.append(document.createElement("button")); });
   expect((await violations(page)).filter((text) => text.startsWith("button-name"))).toHaveLength(1);
-  await page.context().close();
 });

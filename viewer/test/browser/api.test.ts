@@ -7,9 +7,9 @@ import type { Vec2, Vec3 } from "../../src/core/vec";
 import type * as Filters from "../../src/filter";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
-import { settled, type Global } from "./page";
+import { drawn, settled, type Global } from "./page";
 
-const bed = new TestBed({ town: renderTown() });
+const bed = new TestBed({ town: renderTown() }, { draws: false });
 const HALL = THINGS.find(({ id }) => id === 17);
 const world = (x: number, y: number, z: number): Vec3 => [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z];
 const lonLat = (x: number, y: number): Vec2 => lonLatFromLocal(PLACE, [x, y]);
@@ -23,7 +23,6 @@ test("classes have names in upper case, too", async () => {
     const { map3d } = globalThis as Global;
     return [map3d.Map === map3d.map, map3d.Map3D === map3d.map, map3d.ImageLayer === map3d.imageLayer, map3d.Marker === map3d.marker, map3d.Popup === map3d.popup];
   })).toEqual([true, true, true, true, true]);
-  await page.context().close();
 });
 
 test("a position is found by longitude and latitude on roofs and on the ground, hidden or not, and by the name of an object", async () => {
@@ -46,7 +45,6 @@ test("a position is found by longitude and latitude on roofs and on the ground, 
   near(found.byId, world(32, 26, 62), 0.01);
   expect(found.missing).toBe('UsageError: no object has the name "Castle"; search finds objects by a part of their name');
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("markers and views take such positions, and say when they cannot be found", async () => {
@@ -68,10 +66,13 @@ test("markers and views take such positions, and say when they cannot be found",
   const centre = await project(page, world(-45, -4, 34));
   expect(Math.hypot(centre[0] - 400, centre[1] - 300)).toBeLessThan(3);
   // A later call replaces one that waits for its position.
-  await page.evaluate((place) => { (globalThis as Global).map.flyTo({ lonLat: place }).setView([691000, 5336000, 500], 3); }, lonLat(32, 26) as [number, number]);
-  await page.waitForTimeout(600);
+  await page.evaluate(async (place) => {
+    const { map } = globalThis as Global;
+    await map.flyTo({ lonLat: place }).setView([691000, 5336000, 500], 3).findPosition({ lonLat: place });
+    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  }, lonLat(32, 26) as [number, number]);
+  await drawn(page);
   expect((await at(page)).map(Math.round)).toEqual([400, 300]);
-  await page.context().close();
 });
 
 test("a drag beyond the bounds springs back; bounds and zooms can be limited", async () => {
@@ -89,7 +90,6 @@ test("a drag beyond the bounds springs back; bounds and zooms can be limited", a
     return [map.setZoom(9).zoom, map.setZoom(0).zoom, ...map.zoomLimits];
   });
   expect(zooms).toEqual([4.5, 3, 3, 4.5]);
-  await page.context().close();
 });
 
 test("a drag with Shift zooms to the rectangle that it draws", async () => {
@@ -107,7 +107,6 @@ test("a drag with Shift zooms to the rectangle that it draws", async () => {
   expect(await page.locator(".map3d-box").count()).toBe(0);
   const [x, y] = await project(page, target);
   expect(Math.hypot(x - 400, y - 300)).toBeLessThan(2);
-  await page.context().close();
 });
 
 test("panTo, addLayer, removeLayer, whenReady and loaded do what their names say", async () => {
@@ -129,7 +128,6 @@ test("panTo, addLayer, removeLayer, whenReady and loaded do what their names say
     return steps;
   }, bed.url("town"));
   expect(told).toEqual([true, "ready", 0, false, 1, true, false, "400,300"]);
-  await page.context().close();
 });
 
 test("a layer tells of the pointer over its objects, and shows a tooltip", async () => {
@@ -157,7 +155,6 @@ test("a layer tells of the pointer over its objects, and shows a tooltip", async
   expect((await told()).filter((each) => !each.endsWith(" 3"))).toEqual(["mouseover 17", "mouseout 17", "mouseover 2000000001", "click 2000000001", "mouseout 2000000001"]);
   await page.evaluate(() => { (globalThis as Global).layer.bindTooltip(null); });
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("objects are highlighted by name", async () => {
@@ -167,7 +164,6 @@ test("objects are highlighted by name", async () => {
     return [await layer.highlightByName("Chapel"), layer.highlighted, await layer.findByName("chapel"), await layer.highlightByName("Castle").catch((reason: unknown) => (reason as Error).name)];
   });
   expect(found).toEqual([[3_900_000_007], [3_900_000_007], [], "UsageError"]);
-  await page.context().close();
 });
 
 test("controls stand in the corners that are asked for", async () => {
@@ -199,7 +195,6 @@ test("controls stand in the corners that are asked for", async () => {
   });
   expect(refused).toBe('UsageError: unknown position "middle"; use topleft, topright, bottomleft, bottomright');
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("a filter shows the objects that fulfil an expression; objects in view and chosen ones are written as a table", async () => {
@@ -220,5 +215,4 @@ test("a filter shows the objects that fulfil an expression; objects in view and 
   expect(found.one).toContain("1025,School <b>old</b>,building,,true,16,");
   expect(found.missing).toBe('UsageError: no attribute "storeys"; the rendering has class, listed, measuredHeight, note, roofType');
   expect(problems).toEqual([]);
-  await page.context().close();
 });

@@ -45,7 +45,7 @@ function differenceOf(a: Buffer, b: Buffer): Difference {
 }
 
 /** The same scene in both drawers. */
-async function both(name: string, options: object = {}, layer: object = {}, deviceScaleFactor = 1): Promise<{ pages: Page[]; close: () => Promise<void> }> {
+async function both(name: string, options: object = {}, layer: object = {}, deviceScaleFactor = 1): Promise<Page[]> {
   const pages: Page[] = [];
   for (const drawer of ["webgl", "canvas"]) {
     const { page, problems } = await bed.start(name, { zoom: 3, drawer, maxPixelRatio: deviceScaleFactor, ...options }, layer, { deviceScaleFactor, viewport: VIEWPORT });
@@ -53,7 +53,7 @@ async function both(name: string, options: object = {}, layer: object = {}, devi
     expect(await page.evaluate(() => (globalThis as Global).map.drawer)).toBe(drawer);
     pages.push(page);
   }
-  return { pages, close: async () => { for (const page of pages) await page.context().close(); } };
+  return pages;
 }
 
 /** Runs a function on both pages and compares their pictures. */
@@ -73,35 +73,31 @@ const CHOSEN = [17, 1025, 3_900_000_007];
 
 describe("if a tile pixel is a device pixel, both drawers agree except for rounding", () => {
   test.each([1, 2])("in every mode, with and without highlights, at pixel ratio %i", async (dpr) => {
-    const { pages, close } = await both("town", { zoom: dpr === 1 ? 3 : 2 }, {}, dpr);
+    const pages = await both("town", { zoom: dpr === 1 ? 3 : 2 }, {}, dpr);
     for (const mode of MODES) expect((await compared(pages, setMode, mode)).most, mode).toBeLessThanOrEqual(1.01);
     await settledAll(pages, () => (globalThis as Global).layer.highlight([17, 1025], { color: "#1389a0" }).highlight(3_900_000_007));
     for (const mode of MODES) expect((await compared(pages, setMode, mode)).most, `${mode} with highlights`).toBeLessThanOrEqual(1.01);
     await pages[1]?.screenshot({ path: `${OUT}/canvas-highlight-${String(dpr)}.png` });
-    await close();
   });
 
   test("with another light, and without light", async () => {
-    const { pages, close } = await both("town");
+    const pages = await both("town");
     for (const light of [{ azimuth_deg: 20, altitude_deg: 10, ambient: 0.1, diffuse: 3 }, { azimuth_deg: 200, diffuse: 0 }, { lit: false }]) {
       expect((await compared(pages, (given) => (globalThis as Global).map.setLight(given), light)).most).toBeLessThanOrEqual(1.01);
     }
-    await close();
   });
 
   test("if the id layer tells covered pixels", async () => {
-    const { pages, close } = await both("opaque");
+    const pages = await both("opaque");
     for (const mode of ["color", "lit"]) expect((await compared(pages, setMode, mode)).most).toBeLessThanOrEqual(1.01);
     expect((await compared(pages, (ids) => (globalThis as Global).layer.highlight(ids), CHOSEN)).most).toBeLessThanOrEqual(1.01);
-    await close();
   });
 
   test("with a translucent second layer", async () => {
-    const { pages, close } = await both("town");
+    const pages = await both("town");
     const add = (url: string): unknown => new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.4 }).addTo((globalThis as Global).map);
     expect((await compared(pages, add, bed.url("opaque"))).most).toBeLessThanOrEqual(2.01);
     await pages[1]?.screenshot({ path: `${OUT}/canvas-layers.png` });
-    await close();
   });
 });
 
@@ -112,7 +108,7 @@ async function settledAll(pages: readonly Page[], act: () => unknown): Promise<v
 /** The canvas drawer interpolates sRGB and the WebGL drawer linear light, so edges between dark and bright differ; false colours are not interpolated. */
 describe("at fractional zooms", () => {
   test.each([1, 2, 3])("both drawers agree except for edges at pixel ratio %i", async (dpr) => {
-    const { pages, close } = await both("town", {}, {}, dpr);
+    const pages = await both("town", {}, {}, dpr);
     for (const mode of ["lit", "id"]) {
       await settledAll(pages, mode === "lit" ? () => (globalThis as Global).layer.setMode("lit") : () => (globalThis as Global).layer.setMode("id"));
       for (const zoom of dpr === 3 ? [2.6] : [1.8, 2.6, 3.45, 4.7]) {
@@ -122,7 +118,6 @@ describe("at fractional zooms", () => {
       }
     }
     await pages[1]?.screenshot({ path: `${OUT}/canvas-between-${String(dpr)}.png` });
-    await close();
   });
 
   test.each([[4, 1, 2.4], [3.37, 1, 3.4], [2.5, 1, 6.2], [2.71, 2, 4], [3.9, 3, 2]])("at zoom %d and pixel ratio %i no seam is visible between tiles", async (zoom, dpr, most) => {
@@ -139,17 +134,15 @@ describe("at fractional zooms", () => {
     }
     expect(steepest).toBeGreaterThan(0.5);
     expect(steepest).toBeLessThanOrEqual(Math.ceil(most));
-    await page.context().close();
   });
 });
 
 test("ancestors and descendants replace tiles that cannot be fetched", async () => {
-  const { pages, close } = await both("broken", {}, { mode: "id" });
+  const pages = await both("broken", {}, { mode: "id" });
   expect((await compared(pages, setMode, "depth")).most).toBeLessThanOrEqual(1.01);
   expect((await compared(pages, setMode, "lit")).off).toBeLessThan(0.03);
   await pages[1]?.screenshot({ path: `${OUT}/canvas-stand-ins.png` });
   expect((await compared(pages, setZoom, 2)).off).toBeLessThan(0.02);
-  await close();
 });
 
 describe("the drawer", () => {
@@ -192,7 +185,6 @@ describe("the drawer", () => {
     }), [bed.url("town"), drawer] as const);
     expect(got.name).toBe(name);
     expect(got.message).toMatch(message);
-    await page.context().close();
   });
 
   test("a canvas without WebGL replaces a context that is lost for good; gestures still move the map", async () => {
@@ -222,7 +214,6 @@ describe("the drawer", () => {
       return document.querySelector("#mapcanvas")?.parentElement === document.body;
     })).toBe(true);
     expect(problems.filter((text) => !/WebGL|CONTEXT_LOST/i.test(text))).toEqual([]);
-    await page.context().close();
   });
 });
 
@@ -236,7 +227,6 @@ test("picks are exact", async () => {
   }, roof);
   expect(pick).toMatchObject({ id: 17, approximate: false });
   expect(pick.position?.[2]).toBeCloseTo(roof[2], 2);
-  await page.context().close();
 });
 
 test("an idle map draws no frames and sends no messages to workers", async () => {
@@ -260,7 +250,6 @@ test("an idle map draws no frames and sends no messages to workers", async () =>
   }));
   expect(counts.resting).toBe(0);
   expect(counts.moving).toBeGreaterThan(4);
-  await page.context().close();
 });
 
 test("the old picture stays while new light is computed", async () => {
@@ -281,7 +270,6 @@ test("the old picture stays while new light is computed", async () => {
     for (let k = 1; k < 12; k++) setTimeout(() => map.setLight({ azimuth_deg: 30 * k }), 30 * k);
   }));
   expect(least).toBe(1);
-  await page.context().close();
 });
 
 test("if pixels cannot be read exactly, compositing lights nearly the same", async () => {
@@ -314,6 +302,4 @@ test("if pixels cannot be read exactly, compositing lights nearly the same", asy
   expect(shown.most).toBeLessThan(30);
   for (const each of [plain, page]) await settled(each, setMode, "id");
   expect(differenceOf(await picture(plain), await picture(page)).most).toBeLessThanOrEqual(1.01);
-  await page.context().close();
-  await plain.context().close();
 });

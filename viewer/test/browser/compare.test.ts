@@ -65,7 +65,6 @@ test.each(["webgl", "canvas"])("%s: a swipe shows one layer on each side, moves 
   expect(await border.count()).toBe(0);
   expect(await page.evaluate(() => [(globalThis as Comparing).layer.clip, (globalThis as Comparing).later.clip])).toEqual([null, null]);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("epochs show one layer at a time, and the slider shows its label", async () => {
@@ -92,5 +91,4 @@ test("epochs show one layer at a time, and the slider shows its label", async ()
   await rests(page);
   expect(differences(await picture(page), before, 0, WIDE)).toBe(0);
   expect(problems).toEqual([]);
-  await page.context().close();
 });

@@ -49,7 +49,6 @@ test("unchanged tiles are moved and scaled, not drawn; new light draws each tile
   await settled(page, () => (globalThis as Global).map.panBy(300, 0), null);
   expect((await counted(page)).puts).toBeGreaterThan(2);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("several layers, translucent and clipped, look the same as on a canvas", async () => {
@@ -92,7 +91,6 @@ test("a change of view cross-fades: a copy of the old picture covers the new one
   expect(seen).toEqual([2, true, true]);
   await page.waitForFunction(() => document.querySelectorAll(".map3d-mosaics").length === 1);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("a removed map removes its elements", async () => {
@@ -100,5 +98,4 @@ test("a removed map removes its elements", async () => {
   expect(await page.locator(".map3d-mosaics").count()).toBe(1);
   await page.evaluate(() => (globalThis as Global).map.remove());
   expect(await page.locator(".map3d-mosaics").count()).toBe(0);
-  await page.context().close();
 });

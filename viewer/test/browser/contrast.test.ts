@@ -2,8 +2,9 @@ import { expect, test } from "vitest";
 import { renderTown } from "../fixture/rendering";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
+import { animationsEnd } from "./page";
 
-const bed = new TestBed({ town: renderTown(256, 0.38), small: renderTown() });
+const bed = new TestBed({ town: renderTown(256, 0.38), small: renderTown() }, { draws: false });
 const DESK = { viewport: { width: 1280, height: 800 } };
 
 test.each([
@@ -12,16 +13,14 @@ test.each([
   ["forced", { ...DESK, forcedColors: "active" }],
   ["forced-phone", { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true, forcedColors: "active", colorScheme: "dark" }],
 ] as const)("%s: texts stand out, what is chosen and what has the focus is seen", async (name, options) => {
-  const { page, problems } = await bed.openPage(options);
-  await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
-  await page.waitForFunction(() => location.hash.length > 5);
+  const { page, problems } = await bed.openReadyMade(bed.url("town"), options);
   await page.waitForSelector(".map3d-overview-map", { state: "attached" });
   await page.locator("#measure").focus();
   await page.keyboard.press("Enter");
   await page.waitForSelector(".map3d-measure", { state: "attached" });
   await page.locator("#measure-height").focus();
   await page.keyboard.press("Tab");
-  await page.waitForTimeout(1500);
+  await animationsEnd(page);
   await page.screenshot({ path: `${OUT}/${name}.png` });
   const [faint, focus, pressed, plain] = await page.evaluate(() => {
     const channels = (color: string): number[] => (color.match(/[\d.]+/g) ?? []).map(Number);
@@ -47,7 +46,6 @@ test.each([
   expect(focus[2]).toBeGreaterThan(3);
   expect(pressed).not.toBe(plain);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("a user who saves data gets coarser tiles on a dense screen, no ids for hovering, and a notice", async () => {
@@ -56,8 +54,7 @@ test("a user who saves data gets coarser tiles on a dense screen, no ids for hov
     const { page } = await bed.openPage({ viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true });
     if (kind === "saved") await page.addInitScript(() => { Object.defineProperty(navigator, "connection", { value: { saveData: true } }); });
     await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
-    await page.waitForFunction(() => location.hash.length > 5);
-    await page.waitForTimeout(1500);
+    await page.waitForSelector("#tools:not([hidden])");
     expect(await page.locator("#data-saver").isVisible()).toBe(kind === "saved");
     if (kind === "saved") await page.screenshot({ path: `${OUT}/saving.png` });
     await page.context().close();
@@ -74,5 +71,4 @@ test("a user who saves data gets coarser tiles on a dense screen, no ids for hov
   const light = await page.evaluate(() => (globalThis as unknown as { map: { light: { shadows: boolean; occlusion: boolean } } }).map.light);
   expect([light.shadows, light.occlusion]).toEqual([false, false]);
   expect(bed.server.requests.filter((url) => url.includes("/id/"))).toEqual([]);
-  await page.context().close();
 });

@@ -6,11 +6,12 @@ import { ORIGIN } from "../fixture/town";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import type { Global } from "./page";
+import { drawn, steady } from "./page";
 
 const town = renderTown();
 const placeless = { ...town, json: { ...town.json } };
 delete placeless.json.geographic;
-const bed = new TestBed({ town, placeless });
+const bed = new TestBed({ town, placeless }, { draws: false });
 type Controlled = Global & { map3d: typeof Controls; control: Controls.locate; overview: Controls.overview };
 
 const START = { zoom: 3, center: [ORIGIN[0], ORIGIN[1], ORIGIN[2]] };
@@ -30,7 +31,7 @@ test("the location is shown on the surface with an accuracy circle; denied, outs
     await button.click();
     await page.waitForSelector(".map3d-accuracy");
     expect(await page.locator(".map3d-marker").getAttribute("aria-label")).toBe("Sie sind hier (± 12 m)");
-    await page.waitForTimeout(500);
+    await drawn(page);
     const [center, zoom, circle, wide] = await page.evaluate(() => {
       const { map } = globalThis as Global;
       return [map.unproject([400, 300]), map.zoom, document.querySelector(".map3d-accuracy path")?.getBoundingClientRect().width, 24 / map.metresPerPixel] as const;
@@ -65,7 +66,6 @@ test("the location is shown on the surface with an accuracy circle; denied, outs
     new g.map3d.locate().addTo(g.map).toggle();
   });
   await said(other, "Your location can’t be shown, because this map has no geographic coordinates.");
-  await other.context().close();
 });
 
 /** The frame's middle and size in the small map, and the ground in the large map's middle. */
@@ -85,9 +85,9 @@ test("the overview's frame follows the view, by drag, click and keys; the overvi
     const wait = (): void => { if (document.querySelector(".map3d-overview-frame")?.getAttribute("style")) done(); else setTimeout(wait, 50); };
     wait();
   }));
-  await page.waitForTimeout(1200);
+  await drawn(page);
+  const first = await steady(page, () => stateOf(page));
   await page.screenshot({ path: `${OUT}/overview.png` });
-  const first = await stateOf(page);
   expect(first.width / first.height).toBeCloseTo(800 / 600, 1);
   const pad = await page.locator(".map3d-overview-pad").boundingBox() as { x: number; y: number };
   const small_m = (await page.evaluate(() => (globalThis as Global).map.metresPerPixel)) * 800 / first.width;
@@ -96,8 +96,8 @@ test("the overview's frame follows the view, by drag, click and keys; the overvi
   await page.mouse.move(pad.x + first.x + 6, pad.y + first.y, { steps: 3 });
   await page.mouse.move(pad.x + first.x + 12, pad.y + first.y - 8, { steps: 3 });
   await page.mouse.up();
-  await page.waitForTimeout(800);
-  const dragged = await stateOf(page);
+  await drawn(page);
+  const dragged = await steady(page, () => stateOf(page));
   expect(dragged.x - first.x).toBeCloseTo(12, 0);
   expect(dragged.y - first.y).toBeCloseTo(-8, 0);
   expect((dragged.at[0] ?? 0) - (first.at[0] ?? 0)).toBeCloseTo(12 * small_m, -0.5);
@@ -108,9 +108,9 @@ test("the overview's frame follows the view, by drag, click and keys; the overvi
   await page.keyboard.press("ArrowRight");
   await expect.poll(async () => (await stateOf(page)).x, { timeout: 15_000 }).toBeGreaterThan(clicked.x + 3);
   await page.evaluate(() => (globalThis as Global).map.setDirection("90-45"));
-  await page.waitForTimeout(1200);
+  await drawn(page);
+  const turned = await steady(page, () => stateOf(page));
   await page.screenshot({ path: `${OUT}/overview-turned.png` });
-  const turned = await stateOf(page);
   expect(turned.width).toBeGreaterThan(8);
   await page.getByRole("button", { name: "Overview map" }).click();
   expect(await page.locator("canvas").count()).toBe(1);
@@ -126,5 +126,4 @@ test("the overview's frame follows the view, by drag, click and keys; the overvi
   });
   expect(await phone.locator("canvas").count()).toBe(1);
   expect(await phone.getByRole("button", { name: "Overview map" }).getAttribute("aria-expanded")).toBe("false");
-  await phone.context().close();
 });

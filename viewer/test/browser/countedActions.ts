@@ -1,10 +1,9 @@
 import type { Page } from "playwright-core";
 import type { Vec2 } from "../../src/core/vec";
+import { tapApart } from "./page";
 
 /** Maximum number of actions of a task after opening. */
 export const MAX_ACTIONS = 3;
-/** Longer than a double tap. */
-const APART_MS = 600;
 
 /** A user whose actions are counted. */
 export class CountedActions {
@@ -19,15 +18,17 @@ export class CountedActions {
 
   async tap(target: string | Vec2): Promise<void> {
     this.#act(1);
-    if (typeof target === "string") await this.#page.locator(target).tap();
-    else await this.#page.touchscreen.tap(...target);
-    await this.#page.waitForTimeout(APART_MS);
+    if (typeof target === "string") {
+      await this.#page.locator(target).tap();
+      return;
+    }
+    await tapApart(this.#page, target);
+    await this.#page.touchscreen.tap(...target);
   }
 
-  async type(text: string): Promise<void> {
+  type(text: string): Promise<void> {
     this.#act(1);
-    await this.#page.keyboard.type(text);
-    await this.#page.waitForTimeout(APART_MS);
+    return this.#page.keyboard.type(text);
   }
 
   key(name: string): Promise<void> {

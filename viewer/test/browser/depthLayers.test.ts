@@ -16,6 +16,7 @@ const town = renderTown();
 const plan = renderTown(128, 0.29, PLAN);
 const abroad: Fixture = { ...plan, json: { ...plan.json, name: "abroad", crs: { ...plan.json.crs, epsg: 2056, name: "CH1903+ / LV95" } } };
 const bed = new TestBed({ town, plan, abroad });
+const undrawn = new TestBed(bed.server, { draws: false });
 const VIEWPORT = { viewport: { width: 500, height: 420 } };
 const OPTIONS = { center: [ORIGIN[0] - 45, ORIGIN[1], ORIGIN[2]], zoom: 3, direction: "0-45", light: { lit: false } };
 
@@ -79,11 +80,10 @@ test.each(["webgl", "canvas"])("%s: of two renderings with different origins and
   await page.screenshot({ path: `${OUT}/together-half-${drawer}.png` });
   expect((await judged(page, 0.5)).wrong.slice(0, 5)).toEqual([]);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("picks match the visible surface; a clip shows a layer in a part of the map only", async () => {
-  const { page, problems } = await bed.start("town", OPTIONS, {}, VIEWPORT);
+  const { page, problems } = await undrawn.start("town", OPTIONS, {}, VIEWPORT);
   await settled(page, addPlan, [bed.url("plan"), {}] as const);
   const pickAt = (world: readonly number[]): Promise<unknown[]> => page.evaluate(async (at) => {
     const { map, layer } = globalThis as Global;
@@ -102,7 +102,6 @@ test("picks match the visible surface; a clip shows a layer in a part of the map
   expect((await pickAt(inTown(-8, 5, 27.5))).slice(0, 2)).toEqual([3, "town"]);
   await page.screenshot({ path: `${OUT}/together-clip.png` });
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("a rendering in another CRS is refused with a reason, and the first one stays", async () => {
@@ -113,5 +112,4 @@ test("a rendering in another CRS is refused with a reason, and the first one sta
   expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([`rendering "abroad" cannot be shown on this map: its CRS is "EPSG:2056 CH1903+ / LV95", but the map's is "EPSG:25832 ETRS89 / UTM zone 32N"`]);
   await settled(page, () => (globalThis as Global).map.setLight({ lit: false }), null);
   expect(before.equals(await picture(page))).toBe(true);
-  await page.context().close();
 });

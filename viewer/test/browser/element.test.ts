@@ -7,7 +7,7 @@ import { ORIGIN, PLACE } from "../fixture/town";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 
-const bed = new TestBed({ town: renderTown() });
+const bed = new TestBed({ town: renderTown() }, { draws: false });
 const at = (x: number, y: number, z: number): string => [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z].join(" ");
 const HEAD = '<!doctype html><html lang="de"><head><meta charset="utf-8"><title>test</title><link rel="icon" href="data:,"><link rel="stylesheet" href="/element.css">';
 const SCRIPTS = '<script src="/map3d.js"></script><script src="/map3d-element.js"></script>';
@@ -83,7 +83,6 @@ test.each(["/before", "/after"])("%s: attributes and children create a map and u
     '<map-3d-marker position="1 2">: position must be three numbers such as "691000 5336000 520"',
   ]);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("events bubble as map-…; removing the element removes the map, inserting it again restores the view", async () => {
@@ -125,10 +124,8 @@ test("events bubble as map-…; removing the element removes the map, inserting 
   });
   expect(language).toEqual([3, true]);
   await page.evaluate(() => { where().remove(); });
-  await page.waitForTimeout(100);
-  expect(page.workers()).toEqual([]);
+  await expect.poll(() => page.workers()).toEqual([]);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("without a drawable map the fallback content or a message is shown; another src shows the map", async () => {
@@ -151,7 +148,6 @@ test("without a drawable map the fallback content or a message is shown; another
   await bare.page.goto(`${bed.server.origin}/after`);
   await bare.page.getByText("Unsere Anschrift").waitFor();
   expect(await bare.page.locator("map-3d").innerText()).toContain("Offen bis 17 Uhr");
-  await bare.page.context().close();
 });
 
 test("markers stand at longitude and latitude or on an object; orbit is added, and a missing script is told", async () => {
@@ -166,5 +162,4 @@ test("markers stand at longitude and latitude or on an object; orbit is added, a
   await expect.poll(() => problems.join()).toBe("map3d: <map-3d shade> needs the entry shade: load map3d-shade.js after map3d.js, or import \"map3d/shade\"");
   await page.evaluate(() => new Promise((done) => { where().map?.once("idle", done).rotate(1); }));
   expect(await page.evaluate(() => (where().map as unknown as { transition: unknown }).transition !== null)).toBe(true);
-  await page.context().close();
 });

@@ -7,18 +7,19 @@ import { published, writeFolder } from "../fixture/folder";
 import { renderTown } from "../fixture/rendering";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
-import { pixels, type Global } from "./page";
+import { animationsEnd, pixels, type Global } from "./page";
 
 const town = renderTown(128, 0.38);
 const bed = new TestBed({ town });
+const undrawn = new TestBed(bed.server, { draws: false });
 const FOLDERS = { loose: writeFolder(town, "town"), archives: writeFolder(published(town), "town") };
 afterAll(() => { for (const folder of Object.values(FOLDERS)) rmSync(dirname(folder), { recursive: true }); });
 
 type Dropping = Global & { map3d: typeof Files; tool: Files.dropFiles; dropped: string[] };
 
 /** An empty map that accepts files. */
-async function start(options: { language?: string } = {}, context: object = {}): Promise<{ page: Page; problems: string[] }> {
-  const opened = await bed.bare(context);
+async function start(options: { language?: string } = {}, context: object = {}, from = bed): Promise<{ page: Page; problems: string[] }> {
+  const opened = await from.bare(context);
   opened.page.setDefaultTimeout(20_000);
   await opened.page.addScriptTag({ url: "/map3d-files.js" });
   await opened.page.evaluate((given: { language?: string }) => {
@@ -90,7 +91,6 @@ test.each(["loose", "archives"] as const)("a dropped or chosen folder (%s) shows
   expect(await page.evaluate(STATE)).toEqual([expect.any(Number), "0-45", 1, ["town", "town"], []]);
   expect(bed.server.requests.filter((url) => !/^\/(bare|map3d)/.test(url))).toEqual([]);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("the files of a folder can be dropped, and so can a parent folder", async () => {
@@ -103,7 +103,6 @@ test("the files of a folder can be dropped, and so can a parent folder", async (
   await rested(page, 2);
   expect((await pixels(page)).equals(shown)).toBe(true);
   expect(await page.evaluate(STATE)).toEqual([expect.any(Number), "0-45", 1, ["town", "town"], []]);
-  await page.context().close();
 });
 
 test("another city replaces the previous one, wherever it is", async () => {
@@ -118,28 +117,25 @@ test("another city replaces the previous one, wherever it is", async () => {
   expect(await page.evaluate("[map.center.map(Math.round).slice(0, 2).every((part) => part < 400), errors]")).toEqual([true, []]);
   expect((await pixels(page)).equals(first)).toBe(true);
   rmSync(dirname(folder), { recursive: true });
-  await page.context().close();
 });
 
 test.each([["en", "Drop a map folder"], ["de", "Kartenordner zum"], ["fr", "Déposez un dossier"]])("a hint in %s is visible while files are over the map", async (language, words) => {
-  const { page, problems } = await start({ language });
+  const { page, problems } = await start({ language }, {}, undrawn);
   const over = page.locator(".map3d-drop");
   expect(await over.isVisible()).toBe(false);
   await drag(page, [FOLDERS.loose], "over");
   await over.waitFor({ state: "visible" });
   expect(await over.innerText()).toContain(words);
-  await page.waitForTimeout(250);
   await page.screenshot({ path: `${OUT}/files-over-${language}.png` });
   for (const [to, visible] of [["canvas", true], ["html", false]] as const) {
     await page.evaluate((selector) => {
       const [{ map }, relatedTarget] = [globalThis as Global, document.querySelector(selector)];
       map.canvas.dispatchEvent(new DragEvent("dragleave", { bubbles: true, relatedTarget }));
     }, to);
-    await page.waitForTimeout(250);
+    await animationsEnd(page);
     expect(await over.isVisible()).toBe(visible);
   }
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("invalid files show a message and leave the map unchanged", async () => {
@@ -160,7 +156,6 @@ test("invalid files show a message and leave the map unchanged", async () => {
     await drag(page, paths, "dropped");
     await expect.poll(() => said(page), { timeout: 20_000 }).toMatch(words);
   }
-  await page.waitForTimeout(200);
   await page.screenshot({ path: `${OUT}/files-missing.png` });
   writeFileSync(join(broken, "rendering.json"), JSON.stringify({ map3d: "rendering", version: 9 }));
   await drag(page, [broken], "dropped");
@@ -169,23 +164,21 @@ test("invalid files show a message and leave the map unchanged", async () => {
   expect(await page.evaluate("[dropped.length, errors.length, map.layers.length]")).toEqual([1, 4, 1]);
   expect(problems).toEqual([]);
   rmSync(dirname(broken), { recursive: true });
-  await page.context().close();
 });
 
 test("a file that moves after the drop is reported", async () => {
   const folder = writeFolder(published(town), "town");
-  const { page } = await start();
+  const { page } = await start({}, {}, undrawn);
   await drag(page, [folder], "dropped");
   await rested(page);
   renameSync(join(folder, "90-45"), join(folder, "gone"));
   await page.evaluate(() => { (globalThis as Global).map.setDirection("90-45"); });
   await expect.poll(() => page.evaluate<string[]>("errors"), { timeout: 20_000 }).toContainEqual(expect.stringMatching(/90-45\/color\.pmtiles has changed or moved/));
   rmSync(dirname(folder), { recursive: true });
-  await page.context().close();
 });
 
 test("dropped files without folders are matched by name; removing the control leaves nothing behind", async () => {
-  const { page } = await start();
+  const { page } = await start({}, {}, undrawn);
   const json = JSON.stringify({ ...town.json, views: town.json.views.map((view) => ({ ...view, archives: { color: "https://evil.example/color.pmtiles" } })) });
   await page.evaluate((text) => {
     const data = new DataTransfer();
@@ -194,5 +187,4 @@ test("dropped files without folders are matched by name; removing the control le
   }, json);
   await expect.poll(() => said(page), { timeout: 20_000 }).toMatch(/^Some files of this map are missing: https:\/\/evil\.example\/color\.pmtiles/);
   expect(await page.evaluate("(tool.remove(), document.querySelectorAll('.map3d-drop, .map3d-said, input').length)")).toBe(0);
-  await page.context().close();
 });

@@ -13,7 +13,7 @@ import { placeOf } from "./level";
 import { settled, type Global } from "./page";
 
 const town = renderTown();
-const bed = new TestBed({ town });
+const bed = new TestBed({ town }, { draws: false });
 type Featured = Global & { map3d: typeof Geojson & typeof Cluster; overlay: Geojson.geojson; group: Cluster.cluster; told: string[]; pin: InstanceType<Global["map3d"]["marker"]> };
 const frame = makeFrame(town.json.views[0] as never, town.json.size_m, town.json.tile_px, town.json.zmax);
 const world = (x: number, y: number, z?: number): number[] => [ORIGIN[0] + x, ORIGIN[1] + y, ...(z === undefined ? [] : [ORIGIN[2] + z])];
@@ -82,7 +82,6 @@ test.each(["webgl", "canvas"])("%s: a draped polygon covers exactly the pixels w
   }
   expect(odd, "of 900, at the ends of what is hidden").toBeLessThan(60);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("features fire events for pointer and keyboard; names are text; removing the layer leaves nothing behind", async () => {
@@ -93,22 +92,23 @@ test("features fire events for pointer and keyboard; names are text; removing th
     { type: "Feature", properties: { name: "dot" }, geometry: { type: "Point", coordinates: world(-80, -60) } },
   ] }, {});
   const at = await page.evaluate((places) => places.map((place) => (globalThis as Global).map.project(place as unknown as Vec3) as [number, number]), [world(30, -30, 16), world(-80, -60, 0)]);
-  for (const [x, y] of at) {
+  const toldOf = (): Promise<string[]> => page.evaluate(() => (globalThis as unknown as Featured).told);
+  for (const [k, [x, y]] of at.entries()) {
+    const feature = k === 0 ? name : "dot";
     await page.mouse.move(x, y);
-    await page.waitForTimeout(400);
+    await expect.poll(toldOf).toContain(`mouseover ${feature}`);
     await page.mouse.click(x, y);
-    await page.waitForTimeout(400);
+    await expect.poll(toldOf).toContain(`click ${feature}`);
   }
   await page.locator(".map3d-features button").first().focus();
   await page.keyboard.press("Enter");
-  const told = await page.evaluate(() => (globalThis as unknown as Featured).told);
+  const told = await toldOf();
   expect(told).toEqual([`mouseover ${name}`, `click ${name}`, `mouseout ${name}`, "mouseover dot", "click dot", `click ${name}`]);
   expect(await page.locator(".map3d-features button").allTextContents()).toEqual([name, "dot"]);
   expect(await page.locator(".map3d img").count()).toBe(0);
   await page.evaluate(() => { (globalThis as unknown as Featured).overlay.remove(); });
   expect(await page.locator(".map3d-geojson, .map3d-features").count()).toBe(0);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("a dragged marker stays on the surface; a marker behind a building is pale", async () => {
@@ -136,7 +136,6 @@ test("a dragged marker stays on the surface; a marker behind a building is pale"
   await page.keyboard.press("ArrowRight");
   expect((await page.evaluate(() => (globalThis as unknown as Featured).pin.position as Vec3))[0] - landed[0]).toBeCloseTo(3.8, 1);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("10,000 markers in clusters: few elements, no marker lost, the same after a round trip; equal positions spread", async () => {
@@ -173,5 +172,4 @@ test("10,000 markers in clusters: few elements, no marker lost, the same after a
   await page.keyboard.press("Escape");
   expect(await page.locator(".map3d-legs").count()).toBe(0);
   expect(problems).toEqual([]);
-  await page.context().close();
 });

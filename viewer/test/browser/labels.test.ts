@@ -6,9 +6,9 @@ import { renderTown } from "../fixture/rendering";
 import { PLACE } from "../fixture/town";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
-import { settled, type Global } from "./page";
+import { animationsEnd, drawn, settled, type Global } from "./page";
 
-const bed = new TestBed({ town: renderTown() });
+const bed = new TestBed({ town: renderTown() }, { draws: false });
 type G = Global & { map3d: typeof Labelled; names: Labelled.labels; streets: Labelled.labels };
 const line = (...points: [number, number][]): object => ({ type: "LineString", coordinates: points.map((point) => lonLatFromLocal(PLACE, point)) });
 const STREETS = { type: "FeatureCollection", features: [
@@ -26,7 +26,7 @@ async function start(drawer: string, options: object = {}, context: object = {})
     g.streets = new g.map3d.Labels(streets, { button: false }).addTo(g.map);
   }, STREETS);
   await opened.page.waitForFunction(() => [...(globalThis as G).names.visible, ...(globalThis as G).streets.visible].length >= 5);
-  await opened.page.waitForTimeout(400); // fades in
+  await animationsEnd(opened.page); // fades in
   return opened;
 }
 
@@ -48,7 +48,6 @@ test.each(["webgl", "canvas"])("%s: names of buildings and streets stand at thei
   expect(await page.locator(".map3d-label b").count()).toBe(0);
   for (const [k, a] of shown.entries()) for (const b of shown.slice(k + 1)) expect(a.x + a.width < b.x || b.x + b.width < a.x || a.y + a.height < b.y || b.y + b.height < a.y).toBe(true);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("labels that a building hides in one direction are visible in another", async () => {
@@ -56,7 +55,6 @@ test("labels that a building hides in one direction are visible in another", asy
   await settled(page, () => (globalThis as Global).map.rotate(1).rotate(1), null);
   await expect.poll(() => visible(page)).toContain("Back Yard");
   await page.screenshot({ path: `${OUT}/labels-south.png` });
-  await page.context().close();
 });
 
 test("while the map is dragged no label appears or vanishes, and all move with the picture", async () => {
@@ -75,19 +73,19 @@ test("while the map is dragged no label appears or vanishes, and all move with t
   await page.waitForTimeout(150);
   const moved = await boxes(page);
   await page.mouse.up();
-  await page.evaluate(() => new Promise((done) => { setTimeout(done, 500); }));
+  await drawn(page);
+  await animationsEnd(page);
   for (const { text, x, y } of before) {
     const after = moved.find((each) => each.text === text);
     expect(Math.hypot((after?.x ?? NaN) - x - 40, (after?.y ?? NaN) - y - 20)).toBeLessThan(1.5);
   }
   expect(await page.evaluate(() => (globalThis as unknown as { told: string[] }).told.filter((each) => !each.includes("map3d-dragging")))).toEqual([]);
-  await page.context().close();
 });
 
 test("where there is no room, the larger object has its name; a switch hides all names", async () => {
   const { page, problems } = await start("webgl", {}, { viewport: { width: 390, height: 844 } });
   await settled(page, () => (globalThis as Global).map.setZoom(0.6), null);
-  await page.waitForTimeout(400);
+  await animationsEnd(page);
   await page.screenshot({ path: `${OUT}/labels-phone.png` });
   const shown = await boxes(page);
   expect(shown.length).toBeGreaterThan(0);
@@ -100,5 +98,4 @@ test("where there is no room, the larger object has its name; a switch hides all
   await page.evaluate(() => { (globalThis as G).names.remove(); (globalThis as G).streets.remove(); });
   expect(await page.locator(".map3d-labels, .map3d-label").count()).toBe(0);
   expect(problems).toEqual([]);
-  await page.context().close();
 });

@@ -10,6 +10,7 @@ import type { Light } from "../../src/map3d";
 const town = renderTown();
 
 const bed = new TestBed({ town: withBakedLight(town), plain: town });
+const undrawn = new TestBed(bed.server, { draws: false });
 
 const BETWEEN = { azimuth_deg: 110 + 0.3 * 25, altitude_deg: 35.6 };
 /** Weight of DAY[2], computed by the map itself in a unit test; here to byte precision. */
@@ -57,7 +58,6 @@ describe("rendered light dims lit pixels one by one", () => {
     }
     expect(wrong.slice(0, 5)).toEqual([]);
     expect(compared).toBeGreaterThan(8_000);
-    await page.context().close();
   });
 });
 
@@ -72,18 +72,16 @@ test("a time between two hours shows a picture between theirs", async () => {
   expect(darker).toBeGreaterThan(30_000);
   expect(brighter).toBe(0);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("tiles of light are requested only when shown, after colour and normals", async () => {
   bed.server.requests.length = 0;
-  const { page } = await bed.start("town", { light: { shadows: false, occlusion: false } });
+  const { page } = await undrawn.start("town", { light: { shadows: false, occlusion: false } });
   expect(bed.server.requests.filter((url) => /\/(noon|day|ao)\//.test(url))).toEqual([]);
   await settled(page, (light) => (globalThis as Global).map.setLight(light), { shadows: true, azimuth_deg: 200, altitude_deg: 50 });
   const asked = bed.server.requests.filter((url) => /\/(noon|day|ao)\//.test(url));
   expect(asked.length).toBeGreaterThan(0);
   expect(asked.every((url) => url.includes("/noon/"))).toBe(true);
-  await page.context().close();
 });
 
 test("setTime lights the scene by the sun; setting an azimuth ends it", async () => {
@@ -105,11 +103,10 @@ test("setTime lights the scene by the sun; setting an azimuth ends it", async ()
   expect(mean(dark, 0)).toBeLessThan(0.65 * mean(bright, 0));
   expect(mean(dark, 2) / mean(dark, 0)).toBeGreaterThan(1.2 * (mean(bright, 2) / mean(bright, 0)));
   expect(await page.evaluate(() => (globalThis as Global).map.setLight({ azimuth_deg: 10 }).time)).toBeNull();
-  await page.context().close();
 });
 
 test("positions convert to longitude and latitude, and back", async () => {
-  const { page } = await bed.start("plain");
+  const { page } = await undrawn.start("plain");
   const [there, back] = await page.evaluate(() => {
     const { map } = globalThis as Global;
     const lonLat = map.lonLat([691012, 5335950, 510]);
@@ -118,7 +115,6 @@ test("positions convert to longitude and latitude, and back", async () => {
   expect(there?.[0]).toBeCloseTo(11.5680891, 5);
   expect(back?.[0]).toBeCloseTo(691012, 3);
   expect(back?.[1]).toBeCloseTo(5335950, 3);
-  await page.context().close();
 });
 
 test.each(["webgl", "canvas"])("%s: on a dense screen, light comes from the level above, in fewer requests, and looks the same from afar", async (drawer) => {

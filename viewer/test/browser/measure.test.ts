@@ -7,13 +7,12 @@ import { ORIGIN } from "../fixture/town";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import type { Global } from "./page";
+import { drawn, tapApart } from "./page";
 
 
-const bed = new TestBed({ town: renderTown() });
+const bed = new TestBed({ town: renderTown() }, { draws: false });
 
 type Measuring = Global & { map3d: typeof Measure; tool: Measure.measure };
-/** Longer than a double tap. */
-const APART_MS = 600;
 const PIXEL_M = 0.38;
 
 async function measuring(kind: "line" | "height" | "area" | "profile"): Promise<{ page: Page; problems: string[] }> {
@@ -30,9 +29,9 @@ async function measuring(kind: "line" | "height" | "area" | "profile"): Promise<
 async function clickAll(page: Page, places: readonly Vec3[], before = 0): Promise<void> {
   for (const [k, [x, y, z]] of places.entries()) {
     const at = await page.evaluate((world) => (globalThis as Global).map.project(world) as [number, number], [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z] as const);
+    await tapApart(page, at);
     await page.mouse.click(at[0], at[1]);
     await page.waitForFunction((count) => (globalThis as unknown as Measuring).tool.corners.length === count, before + k + 1);
-    await page.waitForTimeout(APART_MS);
   }
 }
 
@@ -53,10 +52,9 @@ test("a line from roof to roof has the length of the model, exact at every zoom,
   const dot = (): Promise<number> => page.evaluate(() => Number(document.querySelector(".map3d-measure circle")?.getAttribute("cx")));
   const before = await dot();
   await page.evaluate(() => { (globalThis as Global).map.panBy(50, 0); });
-  await page.waitForTimeout(300);
+  await drawn(page);
   expect(await dot() - before).toBeCloseTo(50, 0);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("a height is the difference of two points; a third click starts again", async () => {
@@ -69,7 +67,6 @@ test("a height is the difference of two points; a third click starts again", asy
   await clickAll(page, [[32, -32, 16]]);
   expect(await results()).toEqual([]);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("areas of a roof and a facade agree with the model", async () => {
@@ -87,7 +84,6 @@ test("areas of a roof and a facade agree with the model", async () => {
   expect(wall.slope_deg).toBeGreaterThan(88);
   expect((await labels(page))[0]).toMatch(/m² {2}∠ (89|90)°$/);
   await page.screenshot({ path: `${OUT}/measure-wall.png` });
-  await page.context().close();
 });
 
 test("one click on a wall or a roof measures and outlines the face, and marks a hidden part; a second corner starts a polygon", async () => {
@@ -115,13 +111,12 @@ test("one click on a wall or a roof measures and outlines the face, and marks a 
   expect(await off()).toBeLessThan(2.5);
   await page.screenshot({ path: `${OUT}/measure-face.png` });
   await page.evaluate(() => { (globalThis as Global).map.panBy(60, 20).zoomBy(0.5, [400, 300]); });
-  await page.waitForTimeout(600);
+  await drawn(page);
   expect(await off()).toBeLessThan(3.5);
   await clickAll(page, [[-30, -22, 30]], 1);
   expect(await labels(page)).toEqual([]);
   expect(await page.evaluate(() => (globalThis as unknown as Measuring).tool.face)).toBeNull();
   await page.evaluate(() => { (globalThis as unknown as Measuring).tool.clear(); });
-  await page.waitForTimeout(APART_MS);
   // The chapel's wall is hidden by the town hall below.
   await clickAll(page, [[-28, 34, 18]]);
   const hidden = await known();
@@ -130,7 +125,6 @@ test("one click on a wall or a roof measures and outlines the face, and marks a 
   expect((await labels(page))[0]).toMatch(/^≥ \d{2,3}\.\d m² {2}∠ 90°$/);
   await page.screenshot({ path: `${OUT}/measure-face-hidden.png` });
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("Backspace removes the last corner, Escape all; removing the tool leaves nothing behind", async () => {
@@ -142,11 +136,10 @@ test("Backspace removes the last corner, Escape all; removing the tool leaves no
   await page.keyboard.press("Escape");
   expect(await page.evaluate(() => (globalThis as unknown as Measuring).tool.corners.length)).toBe(0);
   await page.mouse.click(5, 5);
-  await page.waitForTimeout(APART_MS);
+  await page.waitForFunction(() => (globalThis as Global).clicks.length === 3);
   expect(await page.evaluate(() => (globalThis as unknown as Measuring).tool.corners.length), "nothing is there").toBe(0);
   await page.evaluate(() => { (globalThis as unknown as Measuring).tool.remove(); });
   expect(await page.locator(".map3d-measure").count()).toBe(0);
-  await page.context().close();
 });
 
 test("a profile has the heights of the model and gaps where it is hidden; pointer and keys move its cursor", async () => {
@@ -190,5 +183,4 @@ test("a profile has the heights of the model and gaps where it is hidden; pointe
   expect(hidden.slice(-40).some(Boolean)).toBe(false);
   await page.screenshot({ path: `${OUT}/measure-profile-hidden.png` });
   expect(problems).toEqual([]);
-  await page.context().close();
 });

@@ -4,7 +4,7 @@ import { ORIGIN } from "../fixture/town";
 import { TestBed } from "./testBed";
 import type { Global } from "./page";
 
-const bed = new TestBed({ town: renderTown() });
+const bed = new TestBed({ town: renderTown() }, { draws: false });
 
 test("a rendering that is missing is one error that says what to do; promises reject with it, whenReady does not call, and another rendering can follow", async () => {
   const { page } = await bed.bare();
@@ -33,7 +33,6 @@ test("a rendering that is missing is one error that says what to do; promises re
   }, [bed.url("nowhere"), bed.url("town"), ORIGIN] as const);
   const message = `FetchError: ${bed.url("nowhere")}/rendering.json: HTTP 404; pass the URL of its folder`;
   expect(told).toEqual({ errors: [message], rejected: [message, message], ready: 0, loaded: false, picked: 0, inView: 0, found: [ORIGIN[0], ORIGIN[1], 503], after: { ready: 1, loaded: true, errors: 1 } });
-  await page.context().close();
 });
 
 test("without a listener, the console has the message, once", async () => {
@@ -48,5 +47,4 @@ test("without a listener, the console has the message, once", async () => {
     await new Promise((done) => setTimeout(done, 100));
   }, bed.url("nowhere"));
   expect(warnings).toEqual([`map3d: ${bed.url("nowhere")}/rendering.json: HTTP 404; pass the URL of its folder`]);
-  await page.context().close();
 });

@@ -13,8 +13,8 @@ import { renderTown } from "../fixture/rendering";
 import { threeScript, triangleGltf } from "../fixture/three";
 import { ORIGIN, trace, type Hit, type Thing } from "../fixture/town";
 import { TestBed } from "./testBed";
-import { OUT } from "./browser";
-import { picture, settled, type Global } from "./page";
+import { answered, OUT } from "./browser";
+import { picture, settled, steady, type Global } from "./page";
 
 const town = renderTown();
 const bed = new TestBed({ town });
@@ -114,7 +114,6 @@ test("a box is visible exactly where it is nearer than the images, with equal br
   await settled(page, () => (globalThis as Modelling).model.addTo((globalThis as Global).map), null);
   expect((await judged(page, DEFAULT_LIGHT)).wrong.slice(0, 5)).toEqual([]);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test.each([[1, 2], [1, 3.6], [2, 2.6], [2, 4.3]])("the same at %d device pixels per CSS pixel and zoom %d", async (dpr, zoom) => {
@@ -126,7 +125,6 @@ test.each([[1, 2], [1, 3.6], [2, 2.6], [2, 4.3]])("the same at %d device pixels 
   expect(found.wrong.slice(0, 5)).toEqual([]);
   expect([found.before > 300, found.behind > 100]).toEqual([true, true]);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test.each(["0-45", "90-45"])("a lawn on the ground is entirely visible at every zoom in view %s", async (direction) => {
@@ -148,7 +146,6 @@ test.each(["0-45", "90-45"])("a lawn on the ground is entirely visible at every 
     expect([zoom, wrong.slice(0, 3)]).toEqual([zoom, []]);
   }
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("with screen-space light, a model that extends beyond the images is entirely visible", async () => {
@@ -161,7 +158,6 @@ test("with screen-space light, a model that extends beyond the images is entirel
   const [r = 0] = await seenAt(page, inTown(-29, -300, 324));
   expect(Math.abs(r - (lambert(WALL, [0, 0, 1], DEFAULT_LIGHT)[0] ?? 0))).toBeLessThanOrEqual(2);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 /** Colours of the canvas at CSS pixels. */
@@ -184,7 +180,6 @@ test("a white wall of a model has the brightness of the same wall in the images"
   const [wall, model] = [await seenAt(page, inTown(30.8, -46, 0.6)), await seenAt(page, inTown(30.8, -67, 12))];
   wall.forEach((byte, k) => { expect(Math.abs(byte - (model[k] ?? 0))).toBeLessThanOrEqual(6); });
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 /** Clicks at a world position; returns the events of the model and of the map. */
@@ -197,7 +192,6 @@ async function clicked(page: Page, world: Vec3): Promise<{ model: { object: stri
   }, world);
   await page.mouse.click(x, y);
   await page.waitForFunction(() => (globalThis as Global).clicks.length > 0);
-  await page.waitForTimeout(350); // not a double click
   return page.evaluate(() => {
     const { hit, clicks } = globalThis as unknown as { hit: { object: string; position: Vec3 } | null; clicks: { id: number }[] };
     return { model: hit, id: clicks[0]?.id ?? 0 };
@@ -223,7 +217,6 @@ test("a click on the visible part of a model fires its event and the pointer sho
   await page.waitForFunction(() => !(globalThis as Global).map.container.classList.contains("map3d-over-model"));
   expect(await clicked(page, inTown(-20, -60, 0))).toEqual({ model: null, id: 3 });
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("removing a model frees all its GPU resources", async () => {
@@ -253,7 +246,6 @@ test("removing a model frees all its GPU resources", async () => {
   // three.js keeps four textures of one pixel, and empty framebuffers.
   expect(Object.entries(await alive()).filter(([, count]) => count > 0)).toEqual([["Texture", 4], ["Framebuffer", 3]]);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 /** Waits for some frames. */
@@ -314,7 +306,6 @@ test("a glTF plays and stops its clips; a still model draws no frames; with redu
   expect(await framesIn(calm, 300)).toBe(0);
   await calm.evaluate(() => (globalThis as Modelling).model.play());
   await moving(calm);
-  await calm.context().close();
 });
 
 test("position, heading and scale in metres of the scene; bounds for fitBounds", async () => {
@@ -328,7 +319,6 @@ test("position, heading and scale in metres of the scene; bounds for fitBounds",
   await settled(page, () => (globalThis as Modelling).model.setHeading(0), null);
   expect((await seenAt(page, inTown(10, -60, 6)))[1]).toBeLessThan(40);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("missing WebGL, loader or file and invalid numbers are errors", async () => {
@@ -368,7 +358,6 @@ test("missing WebGL, loader or file and invalid numbers are errors", async () =>
     const g = globalThis as Modelling;
     new g.map3d.modelLayer(g.THREE, "/none.gltf", { position, loader: new g.GLTFLoader() }).addTo(g.map).on("error", ({ error }) => { done([error.name, (error as { status?: number }).status, error.message.startsWith("/none.gltf: ")]); });
   }), ORIGIN)).toEqual(["FetchError", 404, true]);
-  await other.context().close();
 });
 
 test("a restored context has the model; removing the map removes it", async () => {
@@ -387,7 +376,6 @@ test("a restored context has the model; removing the map removes it", async () =
   await page.evaluate(() => (globalThis as Modelling).map.remove());
   await page.waitForTimeout(200);
   expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([]);
-  await page.context().close();
 });
 
 test("the model rotates with the map; the transition ends in the picture of an immediate change", async () => {
@@ -400,8 +388,8 @@ test("the model rotates with the map; the transition ends in the picture of an i
   await settled(page, () => { new (globalThis as unknown as { map3d: typeof Orbit }).map3d.orbit({ duration_ms: 300 }).addTo((globalThis as Global).map); }, null);
   await page.evaluate(() => { (globalThis as Global).map.rotateBy(Math.PI / 9); });
   await page.waitForFunction(() => (globalThis as Global).map.direction === "90-45");
-  await page.waitForTimeout(1500);
-  const shot = await picture(page);
+  await answered(page);
+  const shot = await steady(page, () => picture(page), 6);
   await page.screenshot({ path: `${OUT}/model-turning.png` });
   const turned = { ...frame, axes: computeAxes(20, 45), d0: -2000 };
   const [[x0, y0], px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin) as [number, number], (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
@@ -421,5 +409,4 @@ test("the model rotates with the map; the transition ends in the picture of an i
   await settled(page, () => { (globalThis as Global).map.endGesture(); }, null);
   expect(cut.equals(await picture(page))).toBe(true);
   expect(problems).toEqual([]);
-  await page.context().close();
 });

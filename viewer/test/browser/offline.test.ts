@@ -5,8 +5,8 @@ import { withDataTiles } from "../fixture/encodeDataTile";
 import { published } from "../fixture/folder";
 import { renderTown } from "../fixture/rendering";
 import { TestBed } from "./testBed";
-import { OUT } from "./browser";
-import { pixels, type Global } from "./page";
+import { OUT, resting } from "./browser";
+import { pixels, steady, type Global } from "./page";
 
 const town = renderTown(128, 0.38);
 const bed = new TestBed({ town, published: published(town), packed: withDataTiles(town, "packed") });
@@ -116,7 +116,6 @@ test.each(["town", "published", "packed"])("an area of %s can be interrupted, re
   expect(await page.evaluate(() => (globalThis as unknown as Kept).map3d.removeArea("tower"))).toBe(false);
   expect([await list(), await page.evaluate(() => caches.keys())]).toEqual([[], []]);
   expect(problems.filter((text) => !FAILED.test(text))).toEqual([]);
-  await page.context().close();
 });
 
 test("a changed rendering is shown in its new state online, and the saved area is updated", async () => {
@@ -139,7 +138,6 @@ test("a changed rendering is shown in its new state online, and the saved area i
     expect((await pixels(page)).equals(after)).toBe(true);
   });
   bed.server.renderings.set("published", fixture);
-  await page.context().close();
 });
 
 test("full storage, a missing worker and an unreachable host are errors", async () => {
@@ -160,28 +158,20 @@ test("full storage, a missing worker and an unreachable host are errors", async 
   expect(await failed("map3d.listAreas().then((areas) => areas.every(({ complete }) => !complete))")).toBe("true");
   bed.server.failures.set("/90-45/normal/", 3);
   expect(await failed("map3d.downloadArea(map, { files: [] }).then(({ complete }) => complete)")).toBe("true");
-  await page.context().close();
 });
 
 const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
 const rows: [string, BrowserContextOptions][] = [["desk", { viewport: { width: 1280, height: 800 } }], ["phone", { ...PHONE, locale: "de-DE" }], ["dark", { ...PHONE, colorScheme: "dark", locale: "fr-FR" }]];
 
 test.each(rows)("the page saves itself and the view for offline use: %s", async (name, options) => {
-  const { page, problems } = await bed.openPage(options);
+  const { page, problems } = await bed.openPage(options, { maps: true });
   page.setDefaultTimeout(30_000);
   const open = async (): Promise<Buffer> => {
     await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
-    await page.waitForFunction(() => location.hash.length > 5);
-    await page.waitForTimeout(1500);
+    await resting(page);
     const { width = 0, height = 0 } = options.viewport ?? {};
-    const shoot = (): Promise<Buffer> => page.screenshot({ clip: { x: width / 2 - 180, y: height / 2 - 160, width: 360, height: 300 } }); // the map without its controls
-    for (let last = await shoot(), same = 0, left = 40; ; left--) {
-      await page.waitForTimeout(700);
-      const next = await shoot();
-      same = next.equals(last) ? same + 1 : 0; // on a busy machine, light computed from depth may take longer than a pause
-      if (same === 6 || left === 0) return next;
-      last = next;
-    }
+    // The map without its controls.
+    return steady(page, () => page.screenshot({ clip: { x: width / 2 - 180, y: height / 2 - 160, width: 360, height: 300 } }));
   };
   const before = await open();
   expect(await page.evaluate(async () => [await caches.keys(), (await navigator.serviceWorker.getRegistrations()).length])).toEqual([[], 0]);
@@ -205,7 +195,7 @@ test.each(rows)("the page saves itself and the view for offline use: %s", async 
     await page.keyboard.press("Enter");
     await page.waitForSelector("#info:not([hidden])");
     expect(await page.locator("#info h2").textContent()).toBe("Tower");
-    await page.waitForTimeout(1500);
+    await resting(page);
     await page.screenshot({ path: `${OUT}/offline-${name}-without.png` });
   });
   await page.locator("#info .close").click();
@@ -217,5 +207,4 @@ test.each(rows)("the page saves itself and the view for offline use: %s", async 
   await page.waitForFunction(() => document.querySelector("#offline-areas li") === null);
   expect(await page.evaluate(() => caches.keys())).toEqual([]);
   expect(problems.filter((text) => !FAILED.test(text))).toEqual([]);
-  await page.context().close();
 });

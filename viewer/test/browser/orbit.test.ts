@@ -6,8 +6,8 @@ import { makeFrame } from "../../src/geo/frame";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN, trace } from "../fixture/town";
 import { TestBed } from "./testBed";
-import { OUT } from "./browser";
-import { picture, settled, type Global } from "./page";
+import { answered, OUT } from "./browser";
+import { picture, settled, steady, type Global } from "./page";
 
 const town = renderTown();
 const bed = new TestBed({ town });
@@ -29,16 +29,10 @@ const twist = (page: Page, deg: number): Promise<void> => page.evaluate((angle) 
   (globalThis as Global).map.rotateBy((angle * Math.PI) / 180);
 }, deg);
 
-/** Waits until the picture has been still for a second: the tiles of the other view have arrived by then. */
-async function steady(page: Page): Promise<Buffer> {
-  let [still, now] = [0, await picture(page)];
-  while (still < 6) {
-    await page.waitForTimeout(170);
-    const next = await picture(page);
-    still = next.equals(now) ? still + 1 : 0;
-    now = next;
-  }
-  return now;
+/** Waits until the tiles of the other view have arrived, and the picture is still. */
+async function still(page: Page): Promise<Buffer> {
+  await answered(page);
+  return steady(page, () => picture(page), 6);
 }
 
 /** Fraction of the pixels whose colour is that of a ray along the current direction, and fraction that show something. */
@@ -65,7 +59,7 @@ test("a gesture between two views shows the picture of a ray caster; on release 
   for (const deg of [20, 25]) {
     await twist(page, deg);
     await page.waitForFunction(() => (globalThis as Global).map.direction === "90-45");
-    const shot = await steady(page);
+    const shot = await still(page);
     const at = deg === 20 ? 20 : 45;
     await page.screenshot({ path: `${OUT}/orbit-${String(at)}.png` });
     const { right, shown } = await agreement(page, shot, at);
@@ -77,7 +71,6 @@ test("a gesture between two views shows the picture of a ray caster; on release 
   expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("0-45");
   expect((await agreement(page, await picture(page), 0)).right).toBeGreaterThan(0.95);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("a transition ends in the picture of an immediate change; markers move along; with reduced motion it is immediate, without WebGL a cross-fade", async () => {
@@ -117,5 +110,4 @@ test("a transition ends in the picture of an immediate change; markers move alon
   }))).toBe(2);
   await flat.waitForFunction(() => document.querySelectorAll("canvas").length === 1);
   expect(none).toEqual([]);
-  await flat.context().close();
 });

@@ -35,6 +35,38 @@ export function settled<A>(page: Page, act: (argument: A) => unknown, argument: 
   }), [`(${act.toString()})`, argument] as const);
 }
 
+/** Waits until the map has drawn everything in view and nothing moves. */
+export const drawn = (page: Page): Promise<unknown> => page.waitForFunction(() => (globalThis as Global).map.loaded());
+
+/** Waits until all transitions of the page's styles have ended. */
+export const animationsEnd = (page: Page): Promise<unknown> => page.waitForFunction(() => document.getAnimations().every((each) => each.playState !== "running" || each.effect?.getComputedTiming().iterations === Infinity));
+
+/** Reads until a value stays the same, and returns it. @param times how often it is read again */
+export async function steady<T>(page: Page, read: () => Promise<T>, times = 1): Promise<T> {
+  const text = (value: T): string => (Buffer.isBuffer(value) ? value.toString("base64") : JSON.stringify(value));
+  let value = await read();
+  for (let same = 0; same < times;) {
+    await page.waitForTimeout(100);
+    const now = await read();
+    same = text(now) === text(value) ? same + 1 : 0;
+    value = now;
+  }
+  return value;
+}
+
+/** Clicks or taps, by page. */
+const lastTaps = new WeakMap<Page, { at: readonly [number, number]; ms: number }>();
+/** More than the time and distance between the taps of a double tap. */
+const [APART_MS, APART_PX] = [400, 40];
+
+/** Waits while a tap at a point would make the last one a double tap. */
+export async function tapApart(page: Page, at: readonly [number, number]): Promise<void> {
+  const last = lastTaps.get(page);
+  const left_ms = last && Math.hypot(at[0] - last.at[0], at[1] - last.at[1]) < APART_PX ? last.ms + APART_MS - performance.now() : 0;
+  if (left_ms > 0) await page.waitForTimeout(left_ms);
+  lastTaps.set(page, { at, ms: performance.now() });
+}
+
 /** Returns the canvas's pixels as RGBA bytes, from the top. */
 export async function pixels(page: Page): Promise<Buffer> {
   const text = await page.evaluate(() => {

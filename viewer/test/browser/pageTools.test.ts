@@ -3,29 +3,25 @@ import { devices, type Page } from "playwright-core";
 import { decodePng } from "../../src/core/png";
 import { renderTown } from "../fixture/rendering";
 import { TestBed } from "./testBed";
-import { OUT } from "./browser";
+import { OUT, resting } from "./browser";
+import { animationsEnd, tapApart } from "./page";
 
 // The page's tools, light and layout.
-const bed = new TestBed({ town: renderTown(256, 0.38) });
+const drawn = new TestBed({ town: renderTown(256, 0.38) });
+const bed = new TestBed(drawn.server, { draws: false });
 const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
 const DESK = { viewport: { width: 1280, height: 800 } };
 
 /** The page with the town, at rest. */
-async function open(options: object, query = `rendering=${bed.url("town")}`): Promise<{ page: Page; problems: string[] }> {
-  const opened = await bed.openPage(options);
-  await opened.page.goto(`${bed.server.origin}/?${query}`);
-  await opened.page.waitForFunction(() => location.hash.length > 5);
-  await opened.page.waitForTimeout(1500);
-  return opened;
-}
+const open = (options: object, query = bed.url("town"), from = bed): Promise<{ page: Page; problems: string[] }> => from.openReadyMade(query, options);
 
 test("the measuring tool takes the clicks: kinds, results with labels, undo, clear, and an end", async () => {
   const { page, problems } = await open(PHONE);
   const corners = (count: number): Promise<unknown> => page.waitForFunction((wanted) => document.querySelectorAll(".map3d-measure circle").length === wanted, count);
   const tap = async (x: number, y: number, count: number): Promise<void> => {
+    await tapApart(page, [x, y]);
     await page.touchscreen.tap(x, y);
     await corners(count);
-    await page.waitForTimeout(600);
   };
   const results = (): Promise<string[]> => page.locator("#measured div").evaluateAll((rows) => rows.map((row) => `${row.firstElementChild?.textContent ?? ""}: ${row.lastElementChild?.textContent ?? ""}`));
   await page.locator("#measure").tap();
@@ -60,15 +56,14 @@ test("the measuring tool takes the clicks: kinds, results with labels, undo, cle
   await page.screenshot({ path: `${OUT}/phone-profile.png` });
   await page.locator("#measure-finish").tap();
   expect(await page.locator(".map3d-measure, .map3d-profile").count()).toBe(0);
-  await page.waitForTimeout(600);
+  await tapApart(page, [150, 420]);
   await page.touchscreen.tap(150, 420);
   await page.waitForSelector("#info:not([hidden])");
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("the sun moves through the day from dawn to dusk; sunrise and sunset are marked, and nothing is black", async () => {
-  const { page, problems } = await open(DESK, `rendering=${bed.url("town")}#0-45/691000.0/5336000.0/500.0/1.60/t=2026-06-21T08:00Z`);
+  const { page, problems } = await open(DESK, `${bed.url("town")}#0-45/691000.0/5336000.0/500.0/1.60/t=2026-06-21T08:00Z`, drawn);
   const clock = (): Promise<string | null> => page.locator("#clock").textContent();
   const before = await clock();
   for (const [id, title] of [["#sunrise", /^Sunrise: \d+:\d\d$/], ["#sunset", /^Sunset: \d+:\d\d$/]] as const) expect(await page.locator(id).getAttribute("title")).toMatch(title);
@@ -90,15 +85,13 @@ test("the sun moves through the day from dawn to dusk; sunrise and sunset are ma
   await page.locator("#play").click();
   await expect.poll(async () => Number(await page.locator("#time").inputValue()), { timeout: 20_000 }).toBeLessThan(12);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("a link's time at night is shown as it is, until the slider moves, and is not black", async () => {
-  const { page, problems } = await open({ ...DESK, timezoneId: "Europe/Berlin" }, `rendering=${bed.url("town")}#0-45/691000.0/5336000.0/500.0/1.60/t=2026-06-21T22:47Z`);
+  const { page, problems } = await open({ ...DESK, timezoneId: "Europe/Berlin" }, `${bed.url("town")}#0-45/691000.0/5336000.0/500.0/1.60/t=2026-06-21T22:47Z`, drawn);
   const clock = (): Promise<string | null> => page.locator("#clock").textContent();
   expect(await clock()).toBe("0:47");
   expect(await page.locator("#time").getAttribute("aria-valuetext")).toBe("0:47");
-  await page.waitForTimeout(1000);
   const { width, height, channels, data } = await decodePng(Uint8Array.from(await page.locator("#mapcanvas").screenshot({ path: `${OUT}/page-night.png` })));
   const middle = [...data.subarray(channels * (width * Math.floor(height / 2) + 450), channels * (width * Math.floor(height / 2) + 750))];
   expect(middle.reduce((sum, value) => sum + value, 0) / middle.length).toBeGreaterThan(30);
@@ -106,16 +99,16 @@ test("a link's time at night is shown as it is, until the slider moves, and is n
   await page.keyboard.press("ArrowRight");
   expect(Number((await clock())?.split(":")[0])).toBeGreaterThan(3);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 for (const drawer of ["webgl", "canvas"]) {
   test(`${drawer}: the content fades into the background, which takes the light of the sky`, async () => {
-    const { page, problems } = await bed.openPage(DESK);
+    const { page, problems } = await drawn.openPage(DESK, { maps: true });
     if (drawer === "canvas") await page.addInitScript(() => { Object.defineProperty(globalThis, "WebGL2RenderingContext", { value: undefined }); });
     await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}#0-45/691000.0/5336000.0/500.0/1.00/t=2026-06-21T12:00Z`);
     await page.waitForSelector(".haze.shown");
-    await page.waitForTimeout(1500);
+    await resting(page);
+    await animationsEnd(page);
     const look = async (path: string): Promise<number[][]> => {
       const { width, channels, data } = await decodePng(Uint8Array.from(await page.screenshot({ path: `${OUT}/${path}.png` })));
       return [[900, 60], [640, 400]].map(([x = 0, y = 0]) => [...data.subarray(channels * (y * width + x), channels * (y * width + x) + 3)]);
@@ -131,12 +124,12 @@ for (const drawer of ["webgl", "canvas"]) {
     expect(Math.max(...steps.slice(first, first + 4))).toBeLessThan(40);
     await page.locator("#time").focus();
     await page.keyboard.press("End");
-    await page.waitForTimeout(1000);
+    await resting(page);
+    await animationsEnd(page);
     const [[red = 0, , blue = 0] = []] = await look(`haze-dusk-${drawer}`);
     expect(red).toBeLessThan(120);
     expect(blue).toBeGreaterThan(red);
     expect(problems).toEqual([]);
-    await page.context().close();
   });
 }
 
@@ -154,11 +147,10 @@ test("with a mouse, hints say click, and Escape leaves the measuring tool", asyn
   expect(await page.locator("#measuring").isVisible()).toBe(false);
   expect(await page.evaluate(() => document.activeElement?.id)).toBe("measure");
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("on a phone, the selection moves clear of its card; a spot on the ground is marked and located", async () => {
-  const { page, problems } = await open(PHONE, `rendering=${bed.url("town")}#0-45/691000.0/5336040.0/500.0/3.50`);
+  const { page, problems } = await open(PHONE, `${bed.url("town")}#0-45/691000.0/5336040.0/500.0/3.50`);
   await page.touchscreen.tap(195, 700);
   await page.waitForSelector("#info:not([hidden])");
   await page.waitForSelector(".map3d-marker");
@@ -172,7 +164,6 @@ test("on a phone, the selection moves clear of its card; a spot on the ground is
   await page.locator("#info .close").tap();
   expect(await page.locator(".map3d-marker").count()).toBe(0);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test.each(["en-GB", "de-DE", "fr-FR"])("at 320 pixels in %s, nothing overlaps and every word fits", async (locale) => {
@@ -203,10 +194,8 @@ test.each(["en-GB", "de-DE", "fr-FR"])("at 320 pixels in %s, nothing overlaps an
   for (const [count, [x, y]] of [[90, 330], [190, 360]].entries()) {
     await page.touchscreen.tap(x ?? 0, y ?? 0);
     await page.waitForFunction((wanted) => document.querySelectorAll(".map3d-measure circle").length > wanted, count);
-    await page.waitForTimeout(600);
   }
   await page.waitForSelector(".map3d-profile");
   await check("profile");
   expect(problems).toEqual([]);
-  await page.context().close();
 });

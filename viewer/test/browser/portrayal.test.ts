@@ -9,6 +9,7 @@ import { pixels, type Global } from "./page";
 
 const town = renderTown(128, 0.38);
 const bed = new TestBed({ town });
+const undrawn = new TestBed(bed.server, { draws: false });
 const litBed = new TestBed({ town: withBakedLight(town) });
 type Showing = Global & { map3d: typeof Portrayal };
 
@@ -38,7 +39,6 @@ test.each(["webgl", "canvas"] as const)("the layer of a service equals that of t
   expect(views[0]).toContain("IMAGELAYERS=COLOR,NORMAL");
   expect(bed.server.requests.filter((url) => url.startsWith("/tiles/"))).toEqual([]);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test.each(["webgl", "canvas"] as const)("shadows and occlusion of a service equal those of the tiles (%s)", async (drawer) => {
@@ -69,7 +69,6 @@ test("on a phone, with one request for each image", async () => {
   expect(bed.server.requests.filter((url) => /IMAGELAYERS=\w+,/.test(url))).toEqual([]);
   await page.screenshot({ path: `${OUT}/portrayal-phone.png` });
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test.each<[string, Record<string, unknown>, string]>([
@@ -82,7 +81,7 @@ test.each<[string, Record<string, unknown>, string]>([
   ["too many styles", { styles: ["a", "b"] }, "styles: expected one per layer, got 2 for 1"],
   ["an invalid view", { views: ["400-45"] }, 'view "400-45": expected a look-at angle'],
 ])("the map names the error: %s", async (_, options, words) => {
-  const { page } = await bed.bare();
+  const { page } = await undrawn.bare();
   await page.addScriptTag({ url: "/map3d-portrayal.js" });
   const message = await page.evaluate(async ([service, given]) => {
     const g = globalThis as unknown as Showing;
@@ -95,5 +94,4 @@ test.each<[string, Record<string, unknown>, string]>([
   }, [`${bed.server.origin}/3dps`, options] as const);
   expect(message).toContain("UsageError: ");
   expect(message).toContain(words);
-  await page.context().close();
 });

@@ -11,6 +11,7 @@ import { picture, settled, type Global } from "./page";
 
 const town = renderTown();
 const bed = new TestBed({ town, fine: renderTown(256, 0.38) });
+const undrawn = new TestBed(bed.server, { draws: false });
 type Printing = Global & { map3d: typeof Print };
 const BARE = { scaleBar: false, northArrow: false, attribution: "", background: "transparent", markers: false };
 
@@ -59,11 +60,10 @@ test.each(["webgl", "canvas"])("%s: a picture of the screen's size equals the sc
   expect(off).toBe(0);
   expect(await page.locator(".map3d").count()).toBe(1);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("title, legend, markers, scale bar and attribution are drawn; invalid options, an abort and a failed tile reject", async () => {
-  const { page } = await bed.start("fine", { zoom: 1.4 }, {}, { viewport: { width: 400, height: 280 } });
+  const { page } = await undrawn.start("fine", { zoom: 1.4 }, {}, { viewport: { width: 400, height: 280 } });
   await page.addScriptTag({ url: "/map3d-print.js" });
   await page.evaluate((at) => {
     const g = globalThis as Global;
@@ -92,11 +92,10 @@ test("title, legend, markers, scale bar and attribution are drawn; invalid optio
   expect(await failed({ background: "url(x)" })).toBe('UsageError: background must be a CSS colour, got "url(x)"');
   expect(await failed({ scale: 4, stop: true })).toBe("Error: enough");
   expect(await page.locator(".map3d").count()).toBe(1);
-  await page.context().close();
 });
 
 test("an overlay is drawn over the map and below the texts, in CSS pixels of the map", async () => {
-  const { page } = await bed.start("town", { zoom: 1.4 }, {}, { viewport: { width: 200, height: 100 } });
+  const { page } = await undrawn.start("town", { zoom: 1.4 }, {}, { viewport: { width: 200, height: 100 } });
   await page.addScriptTag({ url: "/map3d-print.js" });
   const found = await page.evaluate(async (bare) => {
     const g = globalThis as unknown as Printing;
@@ -112,7 +111,6 @@ test("an overlay is drawn over the map and below the texts, in CSS pixels of the
     return [[170, 40], [229, 119], [169, 40], [230, 119], [170, 39], [229, 120]].map(([x = 0, y = 0]) => context.getImageData(x, y, 1, 1).data.join() === "255,0,255,255");
   }, BARE);
   expect(found).toEqual([true, true, false, false, false, false]);
-  await page.context().close();
 });
 
 const DESK = { viewport: { width: 1280, height: 800 } };
@@ -167,5 +165,4 @@ test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: the page saves and p
   await page.locator("#make-picture").click();
   expect(await page.locator("#picture-save").isEnabled()).toBe(true);
   expect(problems).toEqual([]);
-  await page.context().close();
 });

@@ -10,7 +10,7 @@ import { renderTown } from "../fixture/rendering";
 import { ORIGIN, trace, type Hit } from "../fixture/town";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
-import { picture, settled, type Global } from "./page";
+import { drawn, picture, settled, type Global } from "./page";
 
 const town = renderTown();
 const bed = new TestBed({ town, baked: withBakedLight(town) });
@@ -82,7 +82,6 @@ test("estimated shadows match rays to the sun for all visible points", async () 
   expect(counts.shadow / (counts.shadow + counts.missed)).toBeGreaterThan(0.85);
   expect(counts.lit / (counts.lit + counts.falsely)).toBeGreaterThan(0.97);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("occlusion darkens the ground at the foot of a wall, fades with distance, and leaves roofs and open ground unchanged", async () => {
@@ -102,7 +101,6 @@ test("occlusion darkens the ground at the foot of a wall, fades with distance, a
   expect(near).toBeGreaterThan((foot ?? 1) + 0.03);
   expect(open).toBeGreaterThan(0.98);
   expect(roof).toBeGreaterThan(0.98);
-  await page.context().close();
 });
 
 test("after a movement the picture equals that of a map opened there and rests; removal leaves nothing behind", async () => {
@@ -116,7 +114,7 @@ test("after a movement the picture equals that of a map opened there and rests; 
   await page.mouse.move(300, 240, { steps: 4 });
   await page.waitForTimeout(200);
   await page.mouse.up();
-  await page.waitForTimeout(300);
+  await drawn(page);
   expect(Buffer.compare(await picture(page), before)).toBe(0);
   const frames = await page.evaluate(() => new Promise<number>((done) => {
     let drawn = 0;
@@ -126,7 +124,6 @@ test("after a movement the picture equals that of a map opened there and rests; 
   expect(frames).toBe(0);
   await settled(page, () => (globalThis as Global & { shade: { remove(): void } }).shade.remove(), null);
   expect(Buffer.compare(await picture(page), bare)).toBe(0);
-  await page.context().close();
 });
 
 test("an exported picture of several pieces has the shadows of the screen, at its resolution and at twice of it", async () => {
@@ -170,7 +167,6 @@ test("an exported picture of several pieces has the shadows of the screen, at it
   await settled(page, () => (globalThis as Global & { shade: { remove(): void } }).shade.remove(), null);
   expect(difference(await exported(1), bare).most).toBeLessThanOrEqual(1);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test.each([
@@ -185,5 +181,4 @@ test.each([
   expect(bed.server.requests.filter((url) => url.includes("/depth/"))).toEqual([]);
   expect(Buffer.compare(await picture(page), before)).toBe(0);
   expect(problems).toEqual([]);
-  await page.context().close();
 });

@@ -11,6 +11,7 @@ const town = renderTown();
 const divided = renderTown();
 const HEIGHTS = divideColumn(divided.files, "measuredHeight");
 const bed = new TestBed({ town, divided });
+const undrawn = new TestBed(bed.server, { draws: false });
 type Theming = Global & { map3d: typeof Theme; theme: Theme.theme };
 const [GROUND, HALL, SCHOOL, TOWER, CHAPEL] = [3, 17, 1025, 2_000_000_001, 3_900_000_007] as const;
 const VIEWPORT = { viewport: { width: 500, height: 400 } };
@@ -52,7 +53,6 @@ test.each(["webgl", "canvas"])("%s: every pixel has the style of its object, and
   await settled(page, () => (globalThis as Global).layer.setStyle({}), null);
   expect(before.equals(await picture(page))).toBe(true);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("both drawers show the same when lit", async () => {
@@ -74,7 +74,7 @@ test("both drawers show the same when lit", async () => {
 });
 
 test("hidden objects are neither picked nor listed as visible", async () => {
-  const { page } = await bed.start("town", { zoom: 3 });
+  const { page } = await undrawn.start("town", { zoom: 3 });
   const top = [ORIGIN[0] + 32, ORIGIN[1] + 26, ORIGIN[2] + 62] as const;
   const idAt = (): Promise<number> => page.evaluate(async (world) => {
     const { map } = globalThis as Global;
@@ -86,11 +86,10 @@ test("hidden objects are neither picked nor listed as visible", async () => {
   await settled(page, (id) => (globalThis as Global).layer.setStyle({ hidden: [id] }), TOWER);
   expect(await idAt()).not.toBe(TOWER);
   expect(await seen()).not.toContain(TOWER);
-  await page.context().close();
 });
 
 test("attributes are read by column", async () => {
-  const { page } = await bed.start("town");
+  const { page } = await undrawn.start("town");
   const found = await page.evaluate(async () => {
     const { layer } = globalThis as Global;
     const all = await layer.attributes();
@@ -101,11 +100,10 @@ test("attributes are read by column", async () => {
   expect(found.height).toMatchObject({ type: "number", min: 2, max: 62, objects: 5 });
   expect(found.values).toEqual([[GROUND, 2], [HALL, 34], [SCHOOL, 16], [TOWER, 62], [CHAPEL, 20]]);
   expect(found.none).toBe(0);
-  await page.context().close();
 });
 
 test("a theme of a divided column reads the values of objects in view, hidden ones included", async () => {
-  const { page, problems } = await bed.start("divided", { zoom: 3 }, {}, VIEWPORT);
+  const { page, problems } = await undrawn.start("divided", { zoom: 3 }, {}, VIEWPORT);
   const asked: string[] = [];
   page.on("request", (request) => { if (request.url().includes(HEIGHTS)) asked.push(request.url().replace(/^.*columns\//, "")); });
   await page.addScriptTag({ url: "/map3d-theme.js" });
@@ -127,7 +125,6 @@ test("a theme of a divided column reads the values of objects in view, hidden on
   await expect.poll(idsOf, { timeout: 20_000 }).toEqual([[GROUND], [SCHOOL], [CHAPEL], [HALL], [TOWER]]);
   expect(asked.length).toBe(new Set(asked).size);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("a theme colours objects, filters by its legend, and restores all; an unknown attribute is an error", async () => {
@@ -158,7 +155,6 @@ test("a theme colours objects, filters by its legend, and restores all; an unkno
   }));
   expect(failed).toBe('no attribute "height"; the rendering has class, listed, measuredHeight, note, roofType');
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 /** Replaces a column by a summary and shards. Returns its name. */

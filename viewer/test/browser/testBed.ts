@@ -1,8 +1,8 @@
-import { afterAll, beforeAll } from "vitest";
-import type { Browser, BrowserContextOptions } from "playwright-core";
+import { afterAll, afterEach, beforeAll } from "vitest";
+import type { BrowserContextOptions } from "playwright-core";
 import type { Fixture } from "../fixture/rendering";
 import { TestServer } from "../fixture/server";
-import { openBrowser, openPage } from "./browser";
+import { closePages, openPage, resting, type PageOptions } from "./browser";
 import { BARE, begin } from "./page";
 
 type Renderings = Readonly<Record<string, Fixture>>;
@@ -19,25 +19,32 @@ export function serve(renderings: Renderings): TestServer {
   return server;
 }
 
-/** A server and a browser while a file's tests run. */
+/** A server while a file's tests run, and pages while a test runs. */
 export class TestBed {
   readonly server: TestServer;
-  #browser: Browser | undefined;
+  readonly #options: PageOptions;
 
-  /** @param env environment variables of the browser */
-  constructor(renderings: Renderings, env: Record<string, string> = {}) {
-    this.server = serve(renderings);
-    beforeAll(async () => { this.#browser = await openBrowser(env); });
-    afterAll(() => this.#browser?.close());
+  /** @param served renderings to serve, or the server of another bed  @param options of all its pages */
+  constructor(served: Renderings | TestServer, options: PageOptions = {}) {
+    this.server = served instanceof TestServer ? served : serve(served);
+    this.#options = options;
+    afterEach(closePages);
   }
 
   url(rendering: string): string {
     return `${this.server.origin}/tiles/${rendering}`;
   }
 
-  /** @param opening plays the opening of the ready-made page */
-  openPage(context: BrowserContextOptions = {}, opening = false): Opened {
-    return openPage(this.#browser as Browser, context, opening);
+  openPage(context: BrowserContextOptions = {}, options: PageOptions = {}): Opened {
+    return openPage(context, { ...this.#options, ...options });
+  }
+
+  /** Opens the ready-made page and waits until it rests. @param query follows `?rendering=`: the address of a rendering, further parameters, the fragment */
+  async openReadyMade(query = this.url("town"), context: BrowserContextOptions = {}): Opened {
+    const opened = await this.openPage(context, { maps: true });
+    await opened.page.goto(`${this.server.origin}/?rendering=${query}`);
+    await resting(opened.page);
+    return opened;
   }
 
   /** Opens the bare page, without a map. */

@@ -3,10 +3,12 @@ import type { Page } from "playwright-core";
 import { renderTown, type Fixture } from "../fixture/rendering";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
+import { steady } from "./page";
 
 const TILE_PX = 128;
 const town = renderTown(TILE_PX);
 const bed = new TestBed({ town, broken: withThumbnails(town, [{ window: [0, 0, 1], webp: "AAAA" }, null, "AAAA", { window: [0, 0, 9, 9], webp: "AAAA);color:red" }]) });
+const undrawn = new TestBed(bed.server, { draws: false });
 const WINDOW = [14, 20, 100, 92] as const;
 const element = (name: string, more = ""): string => `<!doctype html><html lang="en"><head><meta charset="utf-8"><title>test</title><link rel="icon" href="data:,"><link rel="stylesheet" href="/element.css"></head>
 <body><map-3d src="tiles/${name}" controls="off" attribution="off" ${more}></map-3d><script src="/map3d.js"></script><script src="/map3d-element.js"></script></body></html>`;
@@ -39,7 +41,6 @@ beforeAll(async () => {
   const thumbnails = [];
   for (const { id } of town.json.views) thumbnails.push(await makeThumbnail(page, id));
   bed.server.renderings.set("town", withThumbnails(town, thumbnails));
-  await page.context().close();
 });
 
 /** Records the thumbnails that any frame shows. A property that depends on another can be read as a whole only. */
@@ -56,12 +57,17 @@ function record(): void {
 
 type Recorded = typeof globalThis & { seen: string[] };
 const backgroundOf = (page: Page): Promise<string> => page.evaluate(() => getComputedStyle(document.querySelector(".map3d") ?? document.body).backgroundImage);
+/** Place and size of the thumbnail. */
+const placeOf = (page: Page): Promise<string> => page.evaluate(() => {
+  const { backgroundPosition, backgroundSize } = getComputedStyle(document.querySelector(".map3d") ?? document.body);
+  return `${backgroundPosition} ${backgroundSize}`;
+});
 const numberSeen = (page: Page): Promise<number> => page.evaluate(() => (globalThis as Recorded).seen.length);
 
 /** Opens a page while no tiles of a kind arrive. High contrast, where the page has no haze. */
-async function openHeld(path: string, kind = "color"): Promise<{ page: Page; problems: string[]; release: () => void }> {
+async function openHeld(path: string, kind = "color", from = undrawn): Promise<{ page: Page; problems: string[]; release: () => void }> {
   const release = bed.server.hold(`/${kind}/`);
-  const opened = await bed.openPage({ viewport: { width: 640, height: 480 }, contrast: "more", reducedMotion: "reduce" });
+  const opened = await from.openPage({ viewport: { width: 640, height: 480 }, contrast: "more", reducedMotion: "reduce" });
   await opened.page.addInitScript(record);
   await opened.page.goto(`${bed.server.origin}${path}`);
   await expect.poll(() => bed.server.requests.some((url) => url.includes(`/${kind}/`))).toBe(true);
@@ -96,22 +102,23 @@ function compare(page: Page, first: string, second: string, shifts: readonly (re
 const SHIFTS = [[0, 0], [6, 0], [-6, 0], [0, 6], [0, -6]] as const;
 
 test.each([["page", PAGE], ["element", "/element"], ["canvas", "/canvas"]])("%s: the thumbnail stands where the tiles then appear, moves with the map, and goes", async (name, path) => {
-  const { page, problems, release } = await openHeld(path);
+  const { page, problems, release } = await openHeld(path, "color", bed);
   try {
     await expect.poll(() => backgroundOf(page)).toContain("data:image/webp");
     const first = await shoot(page, `${name}-first`);
     await page.mouse.move(320, 240);
     await page.mouse.wheel(0, -240);
-    await page.waitForTimeout(1000);
+    await steady(page, () => placeOf(page));
     await page.mouse.down();
     await page.mouse.move(290, 265, { steps: 5 });
     await page.mouse.up();
-    await page.waitForTimeout(1000);
+    await steady(page, () => placeOf(page));
     const moved = await shoot(page, `${name}-moved`);
     expect(await backgroundOf(page)).toContain("data:image/webp");
     release();
     await expect.poll(() => backgroundOf(page), { timeout: 20_000 }).toBe("none");
-    await page.waitForTimeout(1000);
+    await page.waitForLoadState("networkidle");
+    await steady(page, () => page.screenshot());
     const tiles = await shoot(page, `${name}-tiles`);
     const [exact = NaN, ...shifted] = await compare(page, moved, tiles, SHIFTS);
     for (const difference of shifted) expect(difference).toBeGreaterThan(exact);
@@ -121,7 +128,6 @@ test.each([["page", PAGE], ["element", "/element"], ["canvas", "/canvas"]])("%s:
   } finally {
     release();
   }
-  await page.context().close();
 });
 
 test.each([
@@ -132,13 +138,12 @@ test.each([
   ["a malformed thumbnail in an element", "/broken", "color"],
 ])("%s shows none at any time, without an error", async (_, path, kind) => {
   const { page, problems, release } = await openHeld(path, kind);
-  await page.waitForTimeout(1500);
+  await page.waitForTimeout(500);
   release();
   await page.waitForFunction(() => document.querySelectorAll(".map3d canvas").length > 0);
-  await page.waitForTimeout(1500);
+  await page.waitForLoadState("networkidle");
   expect(await numberSeen(page)).toBe(0);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("frames before the first tile show it, and an element that is removed leaves nothing", async () => {
@@ -150,5 +155,4 @@ test("frames before the first tile show it, and an element that is removed leave
   release();
   await page.waitForTimeout(300);
   expect(problems).toEqual([]);
-  await page.context().close();
 });

@@ -9,9 +9,13 @@ import { pixels, settled, type Global } from "./page";
 const town = renderTown();
 
 const bed = new TestBed({ town });
+const undrawn = new TestBed(bed.server, { draws: false });
 
 /** A page with a map of the town at rest. */
-const started = (options: object = {}, layer: object = {}, name = "town"): ReturnType<TestBed["start"]> => bed.start(name, options, layer);
+const started = (options: object = {}, name = "town", from = bed): ReturnType<TestBed["start"]> => from.start(name, options);
+
+/** The same, without drawing. */
+const recorded = (options: object = {}, name = "town"): ReturnType<TestBed["start"]> => started(options, name, undrawn);
 
 test("the first complete view is drawn without an error", async () => {
   const { page, problems } = await started();
@@ -26,11 +30,10 @@ test("the first complete view is drawn without an error", async () => {
     return data.filter((value, k) => k % 4 === 3 && value === 255).length / (canvas.width * canvas.height);
   });
   expect(covered).toBeGreaterThan(0.3);
-  await page.context().close();
 });
 
 test("README's example runs unchanged; markers are at their 3D positions", async () => {
-  const { page, problems } = await bed.bare();
+  const { page, problems } = await undrawn.bare();
   const found = await page.evaluate(async (base) => {
     const { map3d } = globalThis as Global;
     const map = new map3d.map("mapcanvas");
@@ -51,11 +54,10 @@ test("README's example runs unchanged; markers are at their 3D positions", async
   expect(Math.abs(found.dy)).toBeLessThan(0.1);
   expect(found.popup).toBe("A <b>chapel</b>");
   expect(problems).toEqual([]);
-  await page.context().close();
 });
 
 test("a click on a known object gives its id, its name and a position within a pixel", async () => {
-  const { page } = await started();
+  const { page } = await recorded();
   const roof: [number, number, number] = [ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34];
   const at = await page.evaluate((world) => (globalThis as Global).map.project(world) as [number, number], roof);
   await page.mouse.click(at[0], at[1]);
@@ -65,15 +67,13 @@ test("a click on a known object gives its id, its name and a position within a p
   const pixel_m = 0.38;
   expect(Math.hypot(...roof.map((part, k) => part - (click?.position?.[k] ?? 0)))).toBeLessThan(2 * pixel_m);
   expect(click?.position?.[2]).toBeCloseTo(ORIGIN[2] + 34, 2);
-  await page.context().close();
 });
 
 test("a click on nothing reports id 0", async () => {
-  const { page } = await started();
+  const { page } = await recorded();
   await page.mouse.click(5, 5);
   await page.waitForFunction(() => (globalThis as Global).clicks.length > 0);
   expect(await page.evaluate(() => (globalThis as Global).clicks[0]?.id)).toBe(0);
-  await page.context().close();
 });
 
 test("without light, colours are shown exactly as stored", async () => {
@@ -91,7 +91,6 @@ test("without light, colours are shown exactly as stored", async () => {
   }
   expect(wrong.slice(0, 10)).toEqual([]);
   expect(compared).toBeGreaterThan(50_000);
-  await page.context().close();
 });
 
 test("each pixel is lit by Lambert's law in linear light, half by its own normal and an eighth by each neighbour's", async () => {
@@ -118,7 +117,6 @@ test("each pixel is lit by Lambert's law in linear light, half by its own normal
   }
   expect(wrong.slice(0, 5)).toEqual([]);
   expect(compared).toBeGreaterThan(50_000);
-  await page.context().close();
 });
 
 test("a highlight changes exactly the pixels of its ids", async () => {
@@ -141,13 +139,12 @@ test("a highlight changes exactly the pixels of its ids", async () => {
   expect(changed).toBeGreaterThan(1000);
   await settled(page, () => (globalThis as Global).layer.clearHighlight(), null);
   expect(before.equals(await pixels(page))).toBe(true);
-  await page.context().close();
 });
 
 test("random data tiles arrive bit for bit", async () => {
   const noise = renderNoise(7);
   bed.server.renderings.set("noise", noise);
-  const { page } = await started({ hover: true }, {}, "noise");
+  const { page } = await recorded({ hover: true }, "noise");
   const got = await page.evaluate(async () => {
     const { layer } = globalThis as Global;
     const [view, store] = [layer.rendering?.views.get("0-45"), layer.tiles];
@@ -162,13 +159,12 @@ test("random data tiles arrive bit for bit", async () => {
   expect(got.ids.length).toBe(64 * 64);
   expect(got.ids.findIndex((id, k) => id !== noise.ids[k])).toBe(-1);
   expect(got.depths.findIndex((depth, k) => depth !== noise.depths[k])).toBe(-1);
-  await page.context().close();
 });
 
 test("random ids are exact on the GPU: highlighting a hundred changes a hundred texels", async () => {
   const noise = renderNoise(9);
   bed.server.renderings.set("noise2", noise);
-  const { page } = await started({ zoom: 2 }, {}, "noise2");
+  const { page } = await started({ zoom: 2 }, "noise2");
   const before = await pixels(page);
   const chosen = [...new Set(noise.ids)].filter((id) => id > 0).slice(200, 300);
   await settled(page, (ids) => (globalThis as Global).layer.highlight(ids), chosen);
@@ -176,11 +172,10 @@ test("random ids are exact on the GPU: highlighting a hundred changes a hundred 
   let changed = 0;
   for (let at = 0; at < 800 * 600; at++) if (before.readUInt32LE(4 * at) !== after.readUInt32LE(4 * at)) changed++;
   expect(changed).toBe(16 * noise.ids.filter((id) => chosen.includes(id)).length);
-  await page.context().close();
 });
 
 test("idle means no requests and no frames", async () => {
-  const { page } = await started();
+  const { page } = await recorded();
   await page.waitForTimeout(300);
   const asked = bed.server.requests.length;
   const frames = await page.evaluate(() => new Promise<number>((done) => {
@@ -194,12 +189,11 @@ test("idle means no requests and no frames", async () => {
   }));
   expect(frames).toBe(0);
   expect(bed.server.requests.length).toBe(asked);
-  await page.context().close();
 });
 
 test("only occupied tiles are requested, with the version of their block", async () => {
   bed.server.requests.length = 0;
-  const { page } = await started({ zoom: 3 });
+  await recorded({ zoom: 3 });
   const tiles = bed.server.requests.filter((url) => url.startsWith("/tiles/town/0-45/"));
   expect(tiles.length).toBeGreaterThan(10);
   for (const url of tiles) {
@@ -207,11 +201,10 @@ test("only occupied tiles are requested, with the version of their block", async
     expect(town.files.has(url.replace("/tiles/town/", "").replace(/\?.*/, "")), url).toBe(true);
   }
   expect(new Set(tiles).size).toBe(tiles.length);
-  await page.context().close();
 });
 
 test("a change of view keeps the point at the centre and the highlights", async () => {
-  const { page } = await started({ zoom: 3, hover: true });
+  const { page } = await recorded({ zoom: 3, hover: true });
   const kept = await page.evaluate(async () => {
     const { map, layer } = globalThis as Global;
     layer.highlight(17);
@@ -230,15 +223,13 @@ test("a change of view keeps the point at the centre and the highlights", async 
   expect(kept.highlighted).toEqual([17]);
   expect(Math.hypot(kept.x - 400, kept.y - 300)).toBeLessThan(1.5);
   expect(kept.after.id).toBe(17);
-  await page.context().close();
 });
 
 test("a server that fails for a while delays tiles but loses none", async () => {
   bed.server.failures.set("/tiles/town/0-45/normal", 6);
-  const { page } = await started();
+  const { page } = await recorded();
   expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([]);
   expect(bed.server.failures.get("/tiles/town/0-45/normal")).toBe(0);
-  await page.context().close();
 });
 
 test("a restored WebGL context shows the same picture", async () => {
@@ -257,11 +248,10 @@ test("a restored WebGL context shows the same picture", async () => {
     await new Promise((done) => map.once("idle", done));
   });
   expect(before.equals(await pixels(page))).toBe(true);
-  await page.context().close();
 });
 
 test("dragging moves the ground with the pointer; the wheel zooms about it", async () => {
-  const { page } = await started();
+  const { page } = await recorded();
   const ground: [number, number, number] = [ORIGIN[0], ORIGIN[1], ORIGIN[2]];
   const at = (): Promise<[number, number]> => page.evaluate((world) => (globalThis as Global).map.project(world) as [number, number], ground);
   const start = await at();
@@ -279,7 +269,6 @@ test("dragging moves the ground with the pointer; the wheel zooms about it", asy
   const zoomed = await at();
   expect(await page.evaluate(() => (globalThis as Global).map.zoom)).toBeGreaterThan(zoom + 0.5);
   expect(Math.hypot(zoomed[0] - moved[0], zoomed[1] - moved[1])).toBeLessThan(1);
-  await page.context().close();
 });
 
 test("without WebGL2 the map reports it in an event and in the page", async () => {
@@ -290,5 +279,4 @@ test("without WebGL2 the map reports it in an event and in the page", async () =
   }));
   expect(message).toContain("WebGL2");
   expect(await page.locator(".map3d-message").textContent()).toContain("WebGL2");
-  await page.context().close();
 });

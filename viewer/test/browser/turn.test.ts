@@ -7,13 +7,14 @@ import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
 
 const bed = new TestBed({ town: renderTown() });
+const undrawn = new TestBed(bed.server, { draws: false });
 const VIEWPORT = { viewport: { width: 500, height: 420 } };
 const FAILED = /Failed to load resource|net::ERR/;
 type Turning = Global & { map3d: typeof Orbit; turns: string[] };
 
 /** @param options those of the map; `dataSaver` fetches nothing ahead */
-async function start(options: object, { orbit = false } = {}): ReturnType<TestBed["start"]> {
-  const opened = await bed.start("town", { zoom: 3, direction: "0-45", dataSaver: true, ...options }, {}, VIEWPORT);
+async function start(options: object, { orbit = false, from = bed } = {}): ReturnType<TestBed["start"]> {
+  const opened = await from.start("town", { zoom: 3, direction: "0-45", dataSaver: true, ...options }, {}, VIEWPORT);
   if (orbit) {
     await opened.page.addScriptTag({ url: "/map3d-orbit.js" });
     await settled(opened.page, () => new (globalThis as Turning).map3d.orbit({ duration_ms: 200 }).addTo((globalThis as Global).map), null);
@@ -60,7 +61,6 @@ test.each([["webgl", false], ["webgl", true], ["canvas", false], ["canvas", true
   expect(Math.min(...fills)).toBeGreaterThan(0.8 * Math.min(filled(before), filled(end)));
   expect(await page.evaluate("errors")).toEqual([]);
   expect(problems).toEqual([]);
-  await page.context().close();
 }, 60_000);
 
 test("turns add up while they wait, and a turn back ends the wait", async () => {
@@ -79,18 +79,16 @@ test("turns add up while they wait, and a turn back ends the wait", async () => 
   await page.evaluate(() => { (globalThis as Global).map.setDirection("0-45"); });
   await idle(page);
   expect((await picture(page)).equals(before)).toBe(true);
-  await page.context().close();
 });
 
 test("a position set while a view waits shows that view at once", async () => {
-  const { page } = await start({});
+  const { page } = await start({}, { from: undrawn });
   const release = bed.server.hold("/90-45/");
   try {
     expect(await page.evaluate(() => (globalThis as Global).map.setDirection("90-45").setView([691000, 5336000, 520], 3).direction)).toBe("90-45");
   } finally {
     release();
   }
-  await page.context().close();
 });
 
 test.each(["webgl", "canvas"])("offline, a turn that cannot be shown is refused, and said once (%s)", async (drawer) => {
@@ -105,7 +103,6 @@ test.each(["webgl", "canvas"])("offline, a turn that cannot be shown is refused,
   await page.evaluate(() => new Promise<void>((done) => { (globalThis as Global).map.once("directionchange", () => { done(); }).rotate(1); }));
   await idle(page);
   expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("90-45");
-  await page.context().close();
 });
 
 test.each(["webgl", "canvas"])("at rest, coarse tiles of both neighbours are fetched, so that a turn needs no network (%s)", async (drawer) => {
@@ -126,13 +123,11 @@ test.each(["webgl", "canvas"])("at rest, coarse tiles of both neighbours are fet
   await page.screenshot({ path: `${OUT}/turn-offline-${drawer}.png` });
   expect(filled(await picture(page))).toBeGreaterThan(0.2);
   expect(problems.filter((text) => !FAILED.test(text))).toEqual([]);
-  await page.context().close();
 });
 
 test("a user who saves data gets nothing ahead", async () => {
   bed.server.requests.length = 0;
-  const { page } = await start({});
+  const { page } = await start({}, { from: undrawn });
   await page.waitForTimeout(700);
   expect(bed.server.requests.filter((url) => /\/town\/(90|180|270)-45\//.test(url))).toEqual([]);
-  await page.context().close();
 });

@@ -5,7 +5,7 @@ import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import type { Global } from "./page";
 
-const bed = new TestBed({ town: renderTown() });
+const bed = new TestBed({ town: renderTown() }, { draws: false });
 type View = Parameters<Global["map"]["setView"]>;
 type Shown = readonly [u: number, v: number, zoom: number];
 
@@ -22,10 +22,10 @@ async function show(hidden: boolean, options: object, view?: View): Promise<{ sh
     await new Promise<void>((ready) => { map.whenReady(() => { ready(); }); });
     if (view) map.setView(...view);
     const idle = new Promise((done) => map.once("idle", done));
-    if (isHidden) await new Promise((done) => setTimeout(done, 200));
+    if (isHidden) await new Promise((done) => setTimeout(done, 50));
     tab.style.height = "500px";
     await idle;
-    await new Promise((done) => setTimeout(done, 200));
+    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
     const { camera } = map.getViewState() as unknown as { camera: { u: number; v: number; zoom: number } };
     return [camera.u, camera.v, camera.zoom] as const;
   }, [bed.url("town"), options, hidden, view] as const);

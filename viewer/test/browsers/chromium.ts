@@ -1,17 +1,16 @@
-import type { Browser, Page } from "playwright-core";
-import { openBrowser, openPage } from "../browser/browser";
+import type { Page } from "playwright-core";
+import { closePages, openPage } from "../browser/browser";
 import { Driver } from "./driver";
 
 /** Chromium, whose pictures are the reference. It accepts no input. */
 export class Chromium extends Driver {
-  private constructor(private readonly browser: Browser, private readonly page: Page, readonly complaints: readonly string[]) {
+  private constructor(private readonly page: Page, readonly complaints: readonly string[]) {
     super();
   }
 
   static async start(): Promise<Chromium> {
-    const browser = await openBrowser();
-    const { page, problems } = await openPage(browser);
-    return new Chromium(browser, page, problems);
+    const { page, problems } = await openPage();
+    return new Chromium(page, problems);
   }
 
   async open(url: string): Promise<void> {
@@ -27,7 +26,7 @@ export class Chromium extends Driver {
   }
 
   close(): Promise<void> {
-    return this.browser.close();
+    return closePages();
   }
 
   protected capture(): Promise<Buffer> {

@@ -77,5 +77,4 @@ test.each([["esbuild", "app.ts"], ["vite", "app.ts"], ["esbuild", "full.ts"]])("
   expect(workers.length).toBeGreaterThan(0);
   for (const url of workers) expect(url).toMatch(/^blob:/);
   expect(problems).toEqual([]);
-  await page.context().close();
 });
