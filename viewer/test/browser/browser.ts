@@ -81,6 +81,14 @@ export async function answered(page: Page): Promise<void> {
   while (waiting.get(page)?.size) await page.waitForTimeout(50);
 }
 
+/** Waits until all requests of a page are answered and the map of the bare page, `map`, shows what came. */
+export async function loaded(page: Page): Promise<void> {
+  do {
+    await answered(page);
+    await page.waitForFunction(() => (globalThis as unknown as { map: { loaded(): boolean } }).map.loaded());
+  } while (waiting.get(page)?.size);
+}
+
 /** Waits until the maps of a ready-made page are drawn, and nothing moves or loads. */
 export async function resting(page: Page): Promise<void> {
   for (let calm = 0; calm < 2;) {

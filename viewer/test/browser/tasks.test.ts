@@ -153,11 +153,12 @@ test("share a view", async () => {
   const { page, actions } = opened;
   await actions.tap(placeOf(page, [32, 26, 62]));
   await page.waitForSelector("#info:not([hidden])");
+  await resting(page);
   await actions.tap("#share");
   await page.waitForSelector("dialog[open] .share-qr");
   await page.screenshot({ path: `${OUT}/task-share-dialog.png` });
   await actions.tap("#share-link-copy");
-  expect(await page.locator("#share-link-copy").textContent()).toBe("Copied");
+  await page.locator("#share-link-copy", { hasText: "Copied" }).waitFor();
   expect(await page.inputValue("#share-embed")).toContain(`<iframe src="${page.url().replaceAll("&", "&amp;")}"`);
   const link = await page.evaluate(() => navigator.clipboard.readText());
   expect(link).toBe(page.url());
