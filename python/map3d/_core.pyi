@@ -308,10 +308,10 @@ class Scene:
     def occupied(self, frame: Frame, level: int, within: tuple[int, NDArray[np.uint32]] | None = None) -> NDArray[np.uint64]:
         """Returns the tiles of a level that may have content, as sorted Morton numbers. `within`: a level above and (n, 2) columns and rows of its
         blocks; only their tiles are examined. Time and memory grow with the occupied tiles, not with the level."""
-    def block_keys(self, frame: Frame, z: int, blocks: NDArray[np.uint32], device: str = "cpu") -> list[str]:
+    def block_keys(self, frame: Frame, z: int, blocks: NDArray[np.uint32], device: str = ...) -> list[str]:
         """Returns the keys of the blocks of level z at (n, 2) columns and rows: hex hashes over everything that a base block's bytes depend on.
         `device`: class of devices that render."""
-    def block_key(self, frame: Frame, z: int, x: int, y: int, device: str = "cpu") -> str:
+    def block_key(self, frame: Frame, z: int, x: int, y: int, device: str = ...) -> str:
         """Returns the key of the block at (z, x, y)."""
     def render_block(self, frame: Frame, z: int, x: int, y: int) -> Block:
         """Renders the base block rooted at (z, x, y)."""

@@ -37,7 +37,7 @@ def change(path, find, put):
 
 def test_published_folder_has_no_problems(workspace, folder):
     done = verify_published(folder)
-    assert (done.files, done.archives, done.tiles) == (15 + 2 + 4, 8, 8 * len(every_tile()))
+    assert (done.files, done.archives, done.tiles) == (15 + 2 + 5, 8, 8 * len(every_tile()))
     assert verify_published(folder, workspace) == done
 
 

@@ -54,7 +54,7 @@ def reasons_of_functions(sources):
 WARNING = re.compile(r"""\b(?:report|self)\.(?:warn|note|warn_file|note_file)\(\s*(?:&format!\()?("[^"]*"|[A-Z_]{2,}|[a-z_.&()]+)""")
 WARNING_VALUES = {
     "reason": {"references.rs", "other_documents.rs", "text_input.rs", "geometry_parser.rs", "appearance_parser.rs", "converter.rs", "pre_scan.rs"},
-    "oddity": {"image_file.rs", "mtl.rs", "grid_parser.rs"},
+    "oddity": {"images.rs", "mtl.rs", "grid_parser.rs"},
 }
 """Variables that hold a reason, and the files that pass them on; `warning_reasons_of_functions` finds their values."""
 PYTHON_VARIABLES = {
@@ -91,7 +91,7 @@ def warning_reasons_of_functions(texts):
     oddities = re.findall(r'Some\("([^"]*)"\)', texts["asset_folder.rs"])
     references = re.findall(r'"((?:reference into another|appearance in another) file: [^"]*)"', texts["references.rs"] + texts["other_documents.rs"])
     encodings = re.findall(r'reason: "([^"]*)"', texts["text_input.rs"])
-    inspect = texts["image_file.rs"].partition("fn inspect(")[2].partition("\n}\n")[0]
+    inspect = texts["images.rs"].partition("fn inspect(")[2].partition("\n}\n")[0]
     images = re.findall(r'(?:map_err\(\|_\| |ok_or\(|Err\(|format!\()"([^"]*)"', inspect)
     assert min(map(len, (of_files, oddities, references, encodings, images))) >= 3
     named = {f"{what}: {reason}" for what in ("image", "library object", "material library") for reason in of_files}

@@ -282,7 +282,7 @@ class _DziWriter(_FilesWriter):
             rows.append(f'  <DisplayRect MinLevel="{first + z}" MaxLevel="{first + z}">{rect}</DisplayRect>')
         return (
             '<?xml version="1.0" encoding="UTF-8"?>\n'
-            f'<Image xmlns="{_NAMESPACE}" TileSize="{manifest.tile_px}" Overlap="0" ExportFormat="{self.source.suffix}">\n'
+            f'<Image xmlns="{_NAMESPACE}" TileSize="{manifest.tile_px}" Overlap="0" Format="{self.source.suffix}">\n'
             f' <Size Width="{side}" Height="{side}"/>\n <DisplayRects>\n' + "\n".join(rows) + "\n </DisplayRects>\n</Image>\n"
         )
 
