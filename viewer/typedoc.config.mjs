@@ -14,7 +14,7 @@ export default {
   disableSources: true,
   hideGenerator: true,
   // Types that are used only as parts of public types.
-  intentionallyNotExported: ["GestureTarget", "OverlayEvents", "ImageLayerHost", "Camera", "Frame", "Rect", "Rgb", "DepthMapping", "DrawStyles", "Shadow", "FilledOptions", "GeographicJson", "SunJson", "ViewJson", "Occupancy", "ThreeNode", "ThreeRenderer", "ThreeTarget", "ThreeCamera", "ThreeRaycaster", "ThreeLight", "ThreeVector", "ThreeBox", "ThreeMixer"],
+  intentionallyNotExported: ["CHANNELS", "GestureTarget", "OverlayEvents", "ImageLayerHost", "Camera", "Frame", "Rect", "Rgb", "DepthMapping", "DrawStyles", "Shadow", "FilledOptions", "GeographicJson", "SunJson", "ViewJson", "Occupancy", "ThreeNode", "ThreeRenderer", "ThreeTarget", "ThreeCamera", "ThreeRaycaster", "ThreeLight", "ThreeVector", "ThreeBox", "ThreeMixer"],
   // Fields need a comment only if their name and type are not enough.
   requiredToBeDocumented: ["Class", "Interface", "TypeAlias", "Function", "Variable", "Enum", "EnumMember", "Method", "Accessor"],
   validation: { notExported: true, invalidLink: true, invalidPath: false, rewrittenLink: true, notDocumented: true, unusedMergeModuleWith: true },
