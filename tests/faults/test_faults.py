@@ -1,5 +1,7 @@
 """A short version of `make faults`; the long one runs for two hours."""
 
+from pathlib import Path
+
 import pytest
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
@@ -10,7 +12,8 @@ from tests.faults.system_calls import is_strace_usable, run_system_calls
 
 
 @pytest.mark.endurance
-def test_killed_processes_lose_no_tile() -> None:
+def test_killed_processes_lose_no_tile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))  # a server that is killed leaves its temporary files
     (report,) = run_kills(runs=1, kills=8, seed=20, houses=24)
     assert report.kills.total() >= 8
     assert report.faults == []

@@ -2,6 +2,7 @@
 
 import ast
 import json
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,8 @@ NOTEBOOK = Path(__file__).parents[2] / "docs" / "examples" / "first_map.ipynb"
 
 
 @pytest.mark.endurance
-def test_notebook_runs_and_shows_what_its_text_says() -> None:
+def test_notebook_runs_and_shows_what_its_text_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     cells = [cell for cell in json.loads(NOTEBOOK.read_text("utf-8"))["cells"] if cell["cell_type"] == "code"]
     assert all(cell["outputs"] == [] for cell in cells), "outputs are not stored"
     names: dict[str, Any] = {"__name__": "notebook"}
