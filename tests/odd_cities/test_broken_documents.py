@@ -42,7 +42,7 @@ def test_a_cut_document_keeps_what_was_read(tmp_path: Path, run: Run) -> None:
     status, out, err = run("site", "city", "-o", "site", "--res", "1", "--view", "0-90", "--workers", "1", "--crs", "local")
     assert status == 0, err
     line = text[:cut].count("\n") + 1
-    assert f"The file breaks off; what comes before is kept. Example: town: at byte {cut}, line {line} (the document ends inside " in out
+    assert f"document broken: town: at byte {cut}, line {line} (the document ends inside " in out
     assert "elements); what comes before is kept\n" in out
     catalogue = Workspace(tmp_path / "workspace").open_catalogue()
     (asset,) = catalogue.assets("city")

@@ -17,7 +17,6 @@ from map3d.cli.output import names_text, plural, size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
-from map3d.ingest.findings import skipped_count, warning_count
 from map3d.requests import Site
 
 if TYPE_CHECKING:
@@ -117,6 +116,7 @@ def _print_problems(workspace: Workspace, catalogue: Catalogue, scene: str) -> N
     for line in warning_lines(by_asset):
         click.echo(line)
     reports = list(by_asset.values())
-    skipped, warnings = sum(map(skipped_count, reports)), sum(map(warning_count, reports))
+    skipped = sum(sum(report.get("skipped", {}).values()) for report in reports)
+    warnings = sum(warning["count"] for report in reports for warning in report.get("warnings", []) if not warning["reason"].startswith("skipped: "))
     if skipped or warnings:
         click.echo(f"skipped {plural(skipped, 'element')}; {plural(warnings, 'warning')}; map3d show report {scene} lists them")

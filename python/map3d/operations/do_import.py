@@ -5,7 +5,6 @@ from typing import Any, Final
 
 from map3d.catalogue import Catalogue, OperationRecord, Workspace
 from map3d.errors import ImportFailed
-from map3d.ingest.findings import findings, skipped_count
 from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported
@@ -59,13 +58,13 @@ def _log(report: OperationReport, done: FilesImport) -> None:
 
 
 def _import_lines(item: Imported) -> Iterator[str]:
-    skipped, objects, triangles = skipped_count(item.report), plural(item.objects, "object"), plural(item.triangles, "triangle")
+    skipped, objects, triangles = sum(item.report.get("skipped", {}).values()), plural(item.objects, "object"), plural(item.triangles, "triangle")
     if skipped:
         yield f"{item.asset}: {objects}, {triangles}, skipped {plural(skipped, 'element')}"
     else:
         yield f"{item.asset}: {objects}, {triangles}"
-    for found in findings(item.report)[:20]:
-        yield f"{item.asset}: {found}"
+    for warning in item.report.get("warnings", ())[:20]:
+        yield f"{item.asset}: {warning['count']:,} × {warning['reason']}, e.g. {warning['example']}"
 
 
 def do_build(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:

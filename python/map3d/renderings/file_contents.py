@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from map3d.catalogue import AssetRecord, Catalogue, Workspace
-from map3d.ingest.findings import Finding, findings, sum_findings
 from map3d.registry import ObjectKind, Registry
 from map3d.renderings.outliers import read_outliers
 from map3d.types import Box, Vec3
@@ -27,6 +26,17 @@ class Rasters:
 
     elevation: int
     imagery: int
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A reason that occurs `count` times. `skipped`: elements with this fault are not in the scene; `whole_file`: said of files, which it counts."""
+
+    reason: str
+    count: int
+    example: str
+    skipped: bool = False
+    whole_file: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,13 +108,16 @@ def sum_kinds(files: Sequence[FileContents]) -> list[ObjectKind]:
     return sorted(found.values(), key=lambda kind: (-kind.count, kind.kind, kind.lod or ""))
 
 
-def findings_of(files: Sequence[FileContents]) -> list[Finding]:
-    """Returns the findings of all files together. The example names its file if there are several."""
-    return sum_findings(
-        replace(found, example=f"{file.source}: {found.example}") if len(files) > 1 and found.example else found
-        for file in files
-        for found in file.findings
-    )
+def sum_findings(files: Sequence[FileContents]) -> list[Finding]:
+    """Returns the findings of all files together: what is said of whole files first, then what was skipped, then by count. The example names its
+    file if there are several."""
+    found: dict[tuple[str, bool], Finding] = {}
+    for file in files:
+        for finding in file.findings:
+            example = f"{file.source}: {finding.example}" if len(files) > 1 and finding.example else finding.example
+            before = found.get((finding.reason, finding.skipped), replace(finding, count=0, example=example))
+            found[finding.reason, finding.skipped] = replace(before, count=before.count + finding.count, example=before.example or example)
+    return sorted(found.values(), key=lambda finding: (not finding.whole_file, not finding.skipped, -finding.count, finding.reason))
 
 
 def _contents(asset: AssetRecord, box: Box | None, kinds: tuple[ObjectKind, ...], outside: int) -> FileContents:
@@ -123,13 +136,30 @@ def _contents(asset: AssetRecord, box: Box | None, kinds: tuple[ObjectKind, ...]
         triangles=report.get("triangles", 0),
         outside=outside,
         textures=_textures(report),
-        findings=tuple(findings(report)),
+        findings=tuple(_findings(report)),
     )
 
 
 def _textures(report: Mapping[str, Any]) -> Textures | None:
     counts = report.get("textures")
     return None if counts is None else Textures(counts["images"], counts["missing"], tuple(report.get("missing_files", ())[:5]))
+
+
+def _findings(report: Mapping[str, Any]) -> list[Finding]:
+    """Returns what was skipped, then the warnings, the most frequent first."""
+    warnings = {warning["reason"]: warning for warning in report.get("warnings", ())}
+    skipped = [
+        Finding(reason, count, str(warnings.pop(f"skipped: {reason}", {}).get("example", "")), skipped=True)
+        for reason, count in report.get("skipped", {}).items()
+    ]
+    others = [
+        Finding(reason, warning["count"], str(warning["example"]), whole_file=warning.get("scope") == "file") for reason, warning in warnings.items()
+    ]
+    return [*sorted(skipped, key=_order), *sorted(others, key=_order)]
+
+
+def _order(finding: Finding) -> tuple[int, str]:
+    return -finding.count, finding.reason
 
 
 def _to_world(box: Box | None, origin: Vec3) -> Box | None:

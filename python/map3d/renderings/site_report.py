@@ -9,14 +9,12 @@ from typing import Any, Final
 
 from map3d.catalogue import Workspace
 from map3d.geometry.views import view_id
-from map3d.ingest.findings import Finding
-from map3d.messages import load_message
 from map3d.registry import ObjectKind
-from map3d.renderings.file_contents import FileContents, Rasters, Textures
+from map3d.renderings.file_contents import FileContents, Finding, Rasters, Textures
 from map3d.types import Box, ViewAngles
 
 FILE: Final = "site-report.json"
-VERSION: Final = 2
+VERSION: Final = 1
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def _parse_file(value: Mapping[str, Any]) -> FileContents:
     parts = {
         "box": _parse_box(value["box"]),
         "kinds": tuple(ObjectKind(**kind) for kind in value["kinds"]),
-        "findings": tuple(Finding(load_message(item["reason"]), item["count"], item["example"]) for item in value["findings"]),
+        "findings": tuple(Finding(**finding) for finding in value["findings"]),
         "rasters": None if rasters is None else Rasters(**rasters),
         "textures": None if textures is None else Textures(textures["images"], textures["missing"], tuple(textures["examples"])),
     }

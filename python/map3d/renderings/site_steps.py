@@ -11,12 +11,11 @@ from map3d import _core
 from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, Workspace
 from map3d.errors import OutsideFrame
 from map3d.geometry.frames import check_content, pin
-from map3d.ingest.findings import Finding
 from map3d.ingest.import_options import ImportOptions
 from map3d.registry import Registry
 from map3d.renderings.build import GROUND, open_scene
 from map3d.renderings.create import create_rendering
-from map3d.renderings.file_contents import file_contents, union
+from map3d.renderings.file_contents import Finding, file_contents, union
 from map3d.renderings.outlier_lines import outlier_lines, place_text
 from map3d.renderings.outliers import read_outliers
 from map3d.renderings.resolution import TERRAIN_CLASSES, Resolution, SurfaceDetail, choose_resolution, surface_detail

@@ -71,7 +71,7 @@ SCHEMAS: Final[dict[str, Schema]] = {
             "file": TEXT,
             "format": TEXT,
             "digest": TEXT,
-            "report": {"type": "object", "description": "Findings (codes with counts, examples and English texts); how coordinates were placed."},
+            "report": {"type": "object", "description": "Counts by reason, warnings with an example each, how the coordinates were transformed."},
         },
         "*",
     ),

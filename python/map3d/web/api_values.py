@@ -5,7 +5,6 @@ from pathlib import PurePath
 from typing import Any
 
 from map3d.catalogue import AssetRecord, Job, LogLine, OperationRecord, RenderingRecord, SceneRecord
-from map3d.ingest.findings import report_document, skipped_count, warning_count
 from map3d.web.host_folders import values_without_host_folders, without_host_folders
 
 
@@ -25,13 +24,13 @@ def asset_value(asset: AssetRecord) -> dict[str, Any]:
     return {
         **_asset_head(asset),
         "triangles": report.get("triangles", 0),
-        "skipped": skipped_count(report),
-        "warnings": warning_count(report),
+        "skipped": sum(report.get("skipped", {}).values()),
+        "warnings": sum(warning["count"] for warning in report.get("warnings", ())),
     }
 
 
 def asset_report_value(asset: AssetRecord) -> dict[str, Any]:
-    return {**_asset_head(asset), "report": values_without_host_folders(report_document(asset.report))}
+    return {**_asset_head(asset), "report": values_without_host_folders(asset.report)}
 
 
 def _asset_head(asset: AssetRecord) -> dict[str, Any]:

@@ -5,14 +5,14 @@ that are not here, such as the reason of an unusual error, stay as they are. tes
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
-from map3d.messages import table
-from map3d.web.page_formats import number_or_text
 from map3d.web.page_language import language
 from map3d.web.page_tools import translate as _
+from map3d.web.report_sentences import fault_sentence, skip_sentence
 
 N_: Final = str
 """Marks a text that is translated where it is shown."""
@@ -52,7 +52,7 @@ BUILT: Final = (
 )
 """Counts of a build that `COUNTS` does not have."""
 
-WARNING: Final = N_("{asset}: {reason} Example: {example}")
+WARNING: Final = N_("{asset}: {count} × {reason}, e.g. {example}")
 LINES: Final = (
     N_("imported {files}, {unchanged} unchanged"),
     N_("imported {files}, {unchanged} unchanged, {failed} failed; the first: {reason}"),
@@ -98,7 +98,7 @@ JOB_STATES: Final = (N_("waiting"), N_("todo"), N_("leased"), N_("done"), N_("qu
 
 REASONS: Final = (
     N_("{file}: no usable triangle in the file"),
-    N_("{file}: no usable triangle in the file; {reason}"),
+    N_("{file}: no usable triangle in the file (skipped: {skipped})"),
     N_("{file}: the parser crashed and nothing was imported: {reason}"),
     N_("{file}: cannot be unpacked: {reason}"),
     N_("the subprocess was ended by {signal} before it responded"),
@@ -167,19 +167,8 @@ def find_sentence(text: str) -> tuple[str, dict[str, str]] | None:
 
 @cache
 def _sentences() -> tuple[Sentence, ...]:
-    found = (Sentence(text, re.compile(_pattern(text), re.DOTALL)) for text in (*SENTENCES, *_findings()))
+    found = (Sentence(text, re.compile(_pattern(text), re.DOTALL)) for text in SENTENCES)
     return tuple(sorted(found, key=lambda sentence: -sentence.fixed))
-
-
-@cache
-def _findings() -> dict[str, dict[str, str]]:
-    """Returns the texts of findings: English → language → text."""
-    rows = [row for row in table().values() if row["severity"] in ("warning", "note", "skipped", "omitted") and "count" in str(row["en"])]
-    return {
-        row["en"] if number is None else row["en"][number]: {name: row[name] if number is None else row[name][number] for name in ("de", "fr")}
-        for row in rows
-        for number in ((None,) if isinstance(row["en"], str) else (0, 1))
-    }
 
 
 def _pattern(text: str) -> str:
@@ -200,19 +189,39 @@ def _translated(text: str) -> str:
     if found is None:
         return text
     sentence, values = found
-    if sentence in _findings():
-        return _findings()[sentence][language()].format(**{name: number_or_text(_value(name, value)) for name, value in values.items()})
+    if sentence == WARNING:
+        return _warning(values)
     return _(sentence, **{name: _value(name, value) for name, value in values.items()}) if values else _(sentence)
 
 
 def _value(name: str, text: str) -> str | int | float:
     if name in NUMBERS:
         return _number(text)
+    if name == "skipped":
+        return " ".join(map(_skipped, text.split(", ")))
     if name == "numbers":
         return ", ".join(map(_translated, text.split(", ")))
     return _translated(text) if name in _TRANSLATED else text
 
 
+def _skipped(text: str) -> str:
+    """Returns a sentence for a count and a reason, as in `3 × zero area`."""
+    count, _times, reason = text.partition(" × ")
+    sentence = skip_sentence(reason)
+    return f"{text}." if sentence is None else _(sentence[0], count=_number(count), **sentence[1])
+
+
 def _number(text: str) -> int | float:
     plain = text.replace(",", "")
     return float(plain) if "." in plain else int(plain)
+
+
+def _warning(values: Mapping[str, str]) -> str:
+    """Returns the sentence of an import report for a known reason."""
+    reason, count = values["reason"], _number(values["count"])
+    known = skip_sentence(reason.removeprefix("skipped: ")) if reason.startswith("skipped: ") else fault_sentence(reason)
+    if known is None:
+        return _(WARNING, **{**values, "count": count})
+    return _(
+        "{asset}: {sentence} Example: {example}", asset=values["asset"], sentence=_(known[0], count=count, **known[1]), example=values["example"]
+    )

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from map3d.accounts import Session
 from map3d.web.access import COOKIE, CSRF_FIELD, access, current_caller
 from map3d.web.host_folders import without_host_folders
-from map3d.web.page_formats import FILTERS, number_or_text
+from map3d.web.page_formats import FILTERS, number
 from map3d.web.page_language import language
 from map3d.web.session_cookie import set_session
 
@@ -36,7 +36,11 @@ def translate(text: str, **values: Any) -> str:
     """Returns the text in the language of the request, with `values` in place of {names}; numbers among them as this language writes them."""
     wanted = language()
     found = text if wanted == "en" else translations(wanted).get(text, text)
-    return found.format(**{name: number_or_text(value) for name, value in values.items()}) if values else found
+    return found.format(**{name: _written(value) for name, value in values.items()}) if values else found
+
+
+def _written(value: Any) -> Any:
+    return number(value) if isinstance(value, int | float) else value
 
 
 @cache

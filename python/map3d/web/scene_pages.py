@@ -11,7 +11,6 @@ from werkzeug.datastructures import MultiDict
 from map3d.catalogue import AssetRecord, RenderingRecord, SceneRecord
 from map3d.errors import BadRequest, CrsError, Map3dError, NotFound
 from map3d.formats import FORMATS
-from map3d.ingest.findings import findings
 from map3d.publish.published_folders import folders_of
 from map3d.renderings.build import is_stale
 from map3d.renderings.create_scene import create_scene
@@ -25,7 +24,7 @@ from map3d.web.forms import form_values, more_controls
 from map3d.web.operation_words import show_all
 from map3d.web.outlier_words import outlier_words
 from map3d.web.page_tools import translate
-from map3d.web.report_words import missing_files, placing_words, summary_of
+from map3d.web.report_words import missing_files, placing_words, report_lines, summary_of
 from map3d.web.studio import ask, check_typed_name, folder_choice, go_to, page
 
 scene_pages = Blueprint("scene_pages", __name__, url_prefix="/studio")
@@ -94,7 +93,7 @@ def import_uploads(scene: str) -> Response:
 @requires("viewer")
 def report(scene: str, asset: str) -> Response:
     record = _asset(scene, asset)
-    lines, missing = findings(record.report), missing_files(record)
+    lines, missing = report_lines(record), missing_files(record)
     return page("report.html", scene=catalogue().scene(scene), asset=summary_of(record), lines=lines, missing=missing, placing=placing_words(record))
 
 

@@ -1,6 +1,5 @@
 //! Geometry that other city objects refer to, kept until the end of the document.
 
-use map3d_base::Reason;
 use map3d_base::asset::Rank;
 
 use super::geometry_arena::{GeometryArena, MAX_DEPTH, NO_NODE, NodeId, NodeKind, Ring};
@@ -17,7 +16,7 @@ pub struct DeferredXLink {
 }
 
 /// Geometry that a reference names and that was not found: the reason, and the reference as written.
-pub type MissingGeometry = IdMap<(Reason, String)>;
+pub type MissingGeometry = IdMap<(&'static str, String)>;
 
 #[derive(Default)]
 pub struct SharedGeometry {

@@ -1,7 +1,5 @@
 //! Why a polygon has no triangles.
 
-use map3d_base::Reason;
-
 /// The reason why a polygon has no triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PolygonError {
@@ -15,12 +13,12 @@ pub enum PolygonError {
 
 impl PolygonError {
     /// Returns the reason as written to reports.
-    pub fn reason(self) -> Reason {
+    pub fn reason(self) -> &'static str {
         match self {
-            Self::NoArea => Reason::PolygonWithoutArea,
-            Self::NotFinite => Reason::CoordinateNotFinite,
-            Self::TooManyVertices => Reason::PolygonWithTooManyVertices,
-            Self::NumericalFailure => Reason::PolygonNotTriangulated,
+            Self::NoArea => "polygon without area",
+            Self::NotFinite => "coordinate is not a finite number",
+            Self::TooManyVertices => "polygon with too many vertices to triangulate",
+            Self::NumericalFailure => "polygon that could not be triangulated",
         }
     }
 }
