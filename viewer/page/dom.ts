@@ -19,3 +19,6 @@ export function withText<K extends keyof HTMLElementTagNameMap>(tag: K, text: st
   if (classes) created.className = classes;
   return created;
 }
+
+/** Events with which a user takes over from a movement of the page's own. */
+export const GESTURES = ["pointerdown", "wheel", "keydown"] as const;

@@ -1,5 +1,6 @@
 import type { map } from "./map3d.module.js";
 import type { orbit } from "./map3d-orbit.module.js";
+import { GESTURES } from "./dom";
 
 /** A round takes 14 seconds. */
 const RAD_PER_S = (2 * Math.PI) / 14;
@@ -21,7 +22,7 @@ export function bindOpening(view: map, turn: orbit): void {
   let [stopped, turned, last] = [false, 0, 0];
   const stop = (): void => {
     stopped = true;
-    for (const type of STOPS) removeEventListener(type, stop, true);
+    for (const type of GESTURES) removeEventListener(type, stop, true);
     turn.endGesture();
   };
   const step = (now: number): void => {
@@ -38,7 +39,7 @@ export function bindOpening(view: map, turn: orbit): void {
     if (turned >= 2 * Math.PI) stop();
     else requestAnimationFrame(step);
   };
-  for (const type of STOPS) addEventListener(type, stop, true);
+  for (const type of GESTURES) addEventListener(type, stop, true);
   view.once("idle", () => {
     setTimeout(() => {
       if (stopped) return;
@@ -47,8 +48,6 @@ export function bindOpening(view: map, turn: orbit): void {
     }, DELAY_MS);
   });
 }
-
-const STOPS = ["pointerdown", "wheel", "keydown"] as const;
 
 /** Whether this session has seen the opening. Embedded pages may have no storage. */
 function wasSeen(): boolean {

@@ -1,15 +1,13 @@
 import { marker, type ClickEvent, type imageLayer, type map, type Vec3 } from "./map3d.module.js";
 import type { InfoPanel } from "./info";
 import { NOT_HIGHLIGHTED } from "./card";
+import { GESTURES } from "./dom";
 import { findWhole } from "./whole";
 import { report } from "./toast";
 import { readPermalink, type Permalink } from "./permalink";
 
 /** Least distance of the selection from the card, CSS pixels. */
 const CLEAR_PX = 40;
-
-/** Gestures that end a flight to a search result. */
-const GESTURES = ["pointerdown", "wheel", "keydown"] as const;
 
 /** The selected object: highlighted, described in the info panel and kept in the permalink. The back button returns to the previous selection. */
 export class Selection {
@@ -58,13 +56,13 @@ export class Selection {
     const approach = new AbortController();
     for (const type of GESTURES) addEventListener(type, () => { approach.abort(); }, { once: true, capture: true, signal: approach.signal });
     this.#view.flyTo(position, zoom);
-    await this.selectId(id, position, true, true, true);
+    await this.selectId(id, position, true, true);
     if (!approach.signal.aborted && this.#permalink.id === id) this.#flyClear(position, zoom);
     approach.abort();
   }
 
-  /** Selects an object by its id. @param position default: the top of its bounding box  @param push adds a history entry  @param pin adds a marker with its title  @param keepsView leaves the map where it is */
-  async selectId(id: number, position: Vec3 | null = null, push = true, pin = false, keepsView = false): Promise<void> {
+  /** Selects an object by its id. @param position default: the top of its bounding box  @param push adds a history entry  @param pin adds a marker with its title, and leaves the map where it is */
+  async selectId(id: number, position: Vec3 | null = null, push = true, pin = false): Promise<void> {
     const changed = id !== this.#permalink.id;
     this.#permalink.id = id;
     const object = await this.#layer.object(id).catch((reason: unknown) => {
@@ -76,7 +74,7 @@ export class Selection {
     const origin = this.#layer.rendering?.json.origin;
     const top: Vec3 | null = low && high && origin ? [origin[0] + (low[0] + high[0]) / 2, origin[1] + (low[1] + high[1]) / 2, origin[2] + high[2]] : null;
     const event: ClickEvent = { id, position: position ?? top, approximate: false, layer: this.#layer, point: [0, 0], ...(object ?? {}) };
-    const title = this.#show(event, keepsView);
+    const title = this.#show(event, pin);
     if (pin && event.position) this.#pin = new marker(title, event.position).addTo(this.#view).select();
     if (push) this.#permalink.write(changed);
   }

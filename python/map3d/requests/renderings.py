@@ -33,13 +33,12 @@ Window = tuple[float, float, float]
 """x and y of the centre in the scene's CRS, and the side of the square, metres."""
 
 
-def data_param(*default: Any, before: str = "S", words: str = "") -> Any:
-    """Declares how normal, id and depth are stored. `before`: the beginning of the help, with the first letter of "store"."""
-    about = (
-        "tore normal, id and depth as one layer of data tiles (tile), or in more than twice the bytes as three PNG layers, which any program reads"
-    )
+def data_param(*default: Any, before: str = "", words: str = "") -> Any:
+    """Declares how normal, id and depth are stored. `before`: words before the help."""
+    tile = f"{before}store normal, id and depth as one layer of data tiles (tile), "
+    about = f"{tile[0].upper()}{tile[1:]}or in more than twice the bytes as three PNG layers, which any program reads (png)."
     choices = tuple(LAYERS_BY_DATA)
-    return param(*default, help=f"{before}{about} (png).", words=words, choices=choices, label="Surface directions, objects and depth as")
+    return param(*default, help=about, words=words, choices=choices, label="Surface directions, objects and depth as")
 
 
 def small_param() -> Any:
@@ -132,7 +131,7 @@ class CreateRendering(LayerDetails):
         label="Only a square: x and y of its centre in the scene's coordinate system, and its side in metres",
     )
     layers: tuple[str, ...] | None = param(None, help=_LAYERS, words=",".join(LAYERS_BY_DATA[DEFAULT_DATA]), minimum=1, label="Layers")
-    data: DataEncoding | None = data_param(None, before="Instead of {layers}: s", words=DEFAULT_DATA)
+    data: DataEncoding | None = data_param(None, before="Instead of {layers}: ", words=DEFAULT_DATA)
     tile_px: int = param(256, help="Side of a tile in pixels.", option="--tile-size", choices=TILE_PX, label="Side of a tile in pixels")
     title: str = param("", help="Display title.", words="the scene's", label="Title")
     attribution: str = param("", help="Attribution text.", words="the scene's", label="Attribution")
@@ -166,6 +165,8 @@ class CreateRendering(LayerDetails):
 
 @dataclass(frozen=True, kw_only=True)
 class BuildMemory:
+    """The memory of a build."""
+
     max_memory_bytes: int | None = param(None, help="Memory for the build.", example="2G", words="2G", option="--max-memory", minimum=1, is_size=True)
 
 
@@ -176,11 +177,15 @@ class BuildAndCreateRendering(CreateRendering, ContentChoice, BuildMemory):
 
 @dataclass(frozen=True, kw_only=True)
 class AddViews:
+    """Adds views to a rendering."""
+
     views: tuple[ViewAngles, ...] = param(help="Look-at angle and pitch in degrees.", example="45-22.5", option="--view")
 
 
 @dataclass(frozen=True, kw_only=True)
 class AddLayers(LayerDetails):
+    """Adds layers to all views of a rendering."""
+
     layers: tuple[str, ...] = param(help=_LAYERS, minimum=1)
 
 
