@@ -20,8 +20,8 @@ from map3d import _core
 from map3d.catalogue import PlannedJob, Workspace
 from map3d.geometry.core_frame import core_frame
 from map3d.jobs.run_settings import RunSettings
-from map3d.renderings.build import build, open_scene
 from map3d.renderings.plan import plan_jobs
+from map3d.scenes.build import build, open_scene
 from map3d.subprocess import Handler, Message, ReportProgress, Subprocess
 from map3d.tiles.naming import morton
 

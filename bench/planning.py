@@ -25,8 +25,8 @@ from map3d import _core
 from map3d.catalogue import PlannedJob, RenderingRecord, SceneRecord, Workspace
 from map3d.cli import app
 from map3d.geometry.frames import pin
-from map3d.renderings.build import BUILD_BYTES, build, open_scene
 from map3d.renderings.plan import PlannedScene, plan_jobs, planned_occupancy
+from map3d.scenes.build import BUILD_BYTES, build, open_scene
 from map3d.tiles.occupancy import Numbers, morton_numbers, numbers_of
 from map3d.types import Box, Layer, ViewAngles
 

@@ -31,7 +31,7 @@ from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import StoredTile, StoreShape
 from map3d.types import BlockId, Layer, ViewAngles
-from map3d.web.server import find_port
+from map3d.web.server.serve import find_port
 
 from .process_time import tree_cpu_s
 from .serve_flood import START_S, Flood, FloodedTiles, add_town, report_flood, town_view

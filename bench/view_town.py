@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from map3d.catalogue import Workspace
-from map3d.renderings.build import build
+from map3d.scenes.build import build
 
 from .benchmark_scene import run_verb
 from .district import DistrictCopier

@@ -138,13 +138,13 @@ def row(folder: Path) -> str:
 
 
 def _not_drawn(found: Mapping[str, Any], folder: Path) -> Iterator[str]:
-    """Yields what is not drawn: skipped elements, objects without geometry, and files, by reason."""
+    """Yields what is not drawn: skipped elements by code, objects without geometry, and files by reason."""
     skipped: Counter[str] = Counter()
     without: Counter[str] = Counter()
     for file in found["files"]:
-        skipped.update({finding["reason"]: finding["count"] for finding in file["findings"] if finding["skipped"]})
+        skipped.update({one["code"]: one["count"] for one in file["findings"] if one["severity"] in ("skipped", "omitted")})
         without.update({kind["kind"].replace("_", " "): kind["count"] - kind["drawn"] for kind in file["kinds"] if kind["count"] > kind["drawn"]})
-    yield from (f"{count:,} × {reason}" for reason, count in skipped.most_common())
+    yield from (f"{count:,} × {code}" for code, count in skipped.most_common())
     yield from (f"{count:,} {kind} without geometry" for kind, count in without.most_common())
     reasons = Counter(_plain(reason.removeprefix(f"{path}: "), folder, Path(path).name) for path, reason in [*found["failed"], *found["left_alone"]])
     for reason, count in reasons.most_common(MAX_REASONS):

@@ -32,6 +32,8 @@ AO_RADIUS_M: tuple[float, float]
 """Minimum and maximum radius of ambient occlusion."""
 NAME_PATTERN: str
 """Pattern of a whole name of a scene, asset, rendering or layer."""
+MESSAGES: str
+"""spec/messages.json."""
 OBJECTS_PER_SHARD: int
 """Objects whose attributes share a file."""
 HEAD_BYTES: int

@@ -11,6 +11,7 @@ from map3d.registry import Registry
 from tests.cli.bad_files import BAD_LINES, DAMAGED_IMAGES, USELESS_FILES, citygml, elevation, house_with, jpeg, textured, truncated
 from tests.cli.tile_ids import ids_in_tiles
 from tests.cli.towns import Run, house
+from tests.findings import skipped, warned
 
 pytestmark = pytest.mark.whole
 
@@ -36,7 +37,12 @@ def run(run: Run) -> Run:
         ("a.gml", b"<html></html>", 2, ("a.gml: XML with root element html", "CityGML")),
         ("empty.gml", b"", 2, ("empty.gml: an empty file", "CityGML")),
         ("empty.obj", b"", 2, ("empty.obj: an empty file", "OBJ")),
-        ("nothing.obj", USELESS_FILES["nothing.obj"], 1, ("nothing.obj: no usable triangle in the file", "1 × index out of range")),
+        (
+            "nothing.obj",
+            USELESS_FILES["nothing.obj"],
+            1,
+            ("nothing.obj: no usable triangle in the file", "refer to missing vertices: 1."),
+        ),
         ("cut.tif", USELESS_FILES["cut.tif"], 1, ("cut.tif: not a valid GTiff raster",)),
         ("bomb.gml", USELESS_FILES["bomb.gml"], 1, ("bomb.gml: a document type definition is not allowed", "remove it")),
         ("head.gml", citygml().encode()[:300], 1, ("head.gml: no usable triangle in the file",)),
@@ -73,9 +79,9 @@ def test_invalid_lines_skip_only_their_faces(run: Run, tmp_path: Path, name: str
     status, out, err = run("add-files", "town", "a.obj", "--json")
     assert (status, err) == (0, "")
     (report,) = (item["report"] for item in json.loads(out)["imported"])
-    assert (report["triangles"], sum(report["skipped"].values())) == (12, bad)
+    assert (report["triangles"], sum(skipped(report).values())) == (12, bad)
     status, out, _ = run("add-files", "town", "a.obj")
-    assert (status, f"{bad} × skipped: " in out, "e.g. line " in out) == (0, True, True)
+    assert (status, f": {bad}. Example: " in out, "line " in out) == (0, True, True)
     status, _, err = run("add-files", "town", "a.obj", "--strict")
     assert (status, err.count("\n"), "line " in err) == (1, 1, True)
 
@@ -84,7 +90,7 @@ def test_truncated_document_is_read_up_to_the_cut(run: Run, tmp_path: Path) -> N
     (tmp_path / "a.gml").write_text(truncated())
     status, out, err = run("add-files", "town", "a.gml", "--crs", "local")
     assert (status, err) == (0, "")
-    assert re.search(r"a: document broken: at byte \d+, line \d+ \(.*\); what comes before is kept\n", out)
+    assert re.search(r"a: The file breaks off; what comes before is kept\. Example: at byte \d+, line \d+ \(.*\); what comes before is kept\n", out)
     with Registry(Workspace(tmp_path / "workspace").registry_path("town")) as registry:
         assert {"one", "two"} <= {item.name for item in registry.objects()}
 
@@ -114,12 +120,12 @@ def test_all_usable_parts_of_a_messy_folder_are_rendered(run: Run, tmp_path: Pat
     assert all(Path(item["source"]).name in item["error"] for item in answer["failed"])
     reports = {item["asset"]: item["report"] for item in answer["imported"]}
     assert set(reports) == {"good", "messy", "truncated", "sound", *BAD_LINES, *DAMAGED_IMAGES}
-    warned = {name: " ".join(f"{w['reason']} {w['example']}" for w in report["warnings"]) for name, report in reports.items()}
-    assert "cut.tif" in warned["messy"], "the elevation model is imported without the damaged raster"
-    assert "file not found missing.jpg" in warned["missing"]
-    assert "unknown format zero.jpg" in warned["zero"]
-    assert "unknown format text.jpg" in warned["text"]
-    assert warned["good"] == warned["sound"] == warned["lying"] == ""
+    said = {name: " ".join(f"{w['code']} {w['example']}" for w in warned(report)) for name, report in reports.items()}
+    assert "cut.tif" in said["messy"], "the elevation model is imported without the damaged raster"
+    assert "image-file-not-found missing.jpg" in said["missing"]
+    assert "image-format-unknown zero.jpg" in said["zero"]
+    assert "image-format-unknown text.jpg" in said["text"]
+    assert said["good"] == said["sound"] == said["lying"] == ""
 
     status, out, err = run("create-rendering", "town", "view", "--res", "0.2", "--view", "0/45", "--json")
     assert status == 0, err

@@ -81,7 +81,7 @@ def test_textures_and_defects_of_an_obj_file(tmp_path: Path, run: Run) -> None:
     status, out, _ = run("inspect", str(town), "--crs", "local")
     assert status == 0
     assert "textures     1, 1 missing: wall.jpg" in out
-    assert "1 × skipped: " in out
+    assert "Skipped faces with fewer than 3 vertices: 1. Example: " in out
 
 
 def test_a_single_unreadable_file_is_an_error(tmp_path: Path, run: Run, temporary: Path) -> None:

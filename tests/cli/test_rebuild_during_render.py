@@ -11,8 +11,8 @@ from map3d.ingest.sources import find_sources
 from map3d.jobs.events import RunEvent, SceneChanged
 from map3d.jobs.run import Run as RenderRun
 from map3d.jobs.run_settings import RunSettings
-from map3d.renderings.build import BUILD_BYTES, build
 from map3d.renderings.render_task import RenderTask
+from map3d.scenes.build import BUILD_BYTES, build
 from map3d.subprocess import Message
 from tests.cli.test_incremental import render_from_scratch
 from tests.cli.test_whole import digest

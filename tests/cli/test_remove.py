@@ -195,7 +195,7 @@ def test_published_folders_that_stay_are_in_the_json(run: Run, town: Workspace) 
 
 @pytest.mark.parametrize("kind", ["folder", "s3"])
 def test_tiles_in_an_object_store_go_too(run: Run, town: Workspace, tmp_path: Path, request: pytest.FixtureRequest, kind: str) -> None:
-    from map3d.web.asgi_app import create_app
+    from map3d.web.server.asgi_app import create_app
     from tests.web.conftest import Client
 
     url = (tmp_path / "tiles").as_uri() if kind == "folder" else request.getfixturevalue("s3_url")
@@ -230,7 +230,7 @@ def test_scene_with_renderings_is_refused_naming_them(run: Run, town: Workspace)
 
 
 def test_open_server_answers_404_for_what_was_removed(run: Run, town: Workspace) -> None:
-    from map3d.web.asgi_app import create_app
+    from map3d.web.server.asgi_app import create_app
     from tests.web.conftest import Client
 
     client = Client(create_app(town.root))
@@ -284,7 +284,7 @@ def test_scene_with_a_running_import_is_not_removed(run: Run, town: Workspace) -
 KILLED = """
 import os, sys
 from map3d.cli import app
-import map3d.ingest.asset_removal as asset_removal, map3d.renderings.remove_rendering as rendering, map3d.renderings.remove_scene as scene
+import map3d.ingest.asset_removal as asset_removal, map3d.lifecycle.remove_rendering as rendering, map3d.lifecycle.remove_scene as scene
 from map3d.catalogue.sqlite import SqliteCatalogue
 from map3d.object_store import open_object_store
 from map3d.registry import Registry

@@ -8,9 +8,9 @@ import pytest
 
 from map3d.catalogue import Workspace
 from map3d.object_store import open_object_store
-from map3d.renderings.track_stores import open_track, rendering_record
 from map3d.tiles.manifest import Manifest
-from map3d.web.asgi_app import create_app
+from map3d.tiles.track_stores import open_track, rendering_record
+from map3d.web.server.asgi_app import create_app
 from tests.cli.towns import Run, house, write_town
 from tests.web.conftest import Client
 

@@ -13,7 +13,7 @@ from PIL import Image
 from map3d import _core, types
 from map3d.geometry.core_frame import core_frame
 from map3d.geometry.frames import PinnedFrame
-from map3d.renderings.view_preview import visible
+from map3d.previews.view_preview import visible
 from map3d.tiles.decode_tile import decode_tile
 from map3d.types import LAYERS, Layer, LayerRow, Sun, ViewAngles
 

@@ -8,7 +8,7 @@ import pytest
 
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
-from map3d.web.asgi_app import create_app
+from map3d.web.server.asgi_app import create_app
 from map3d_town import TownSpec, make_town
 from tests.data_tiles.towns import RES_M, VIEW
 from tests.web.conftest import Client

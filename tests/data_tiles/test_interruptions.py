@@ -12,12 +12,12 @@ import pytest
 
 from map3d.catalogue import State, Workspace
 from map3d.cli.app import run
-from map3d.jobs.on_demand_worker import OnDemandSettings
+from map3d.jobs.on_demand.worker import OnDemandSettings
 from map3d.publish import publish
 from map3d.publish.pmtiles_archive import Archive
 from map3d.types import TileId
 from map3d.web import create_app
-from map3d.web.settings import ServerSettings
+from map3d.web.http.settings import ServerSettings
 from tests.data_tiles.towns import KINDS, RES_M, VIEW, stored_tiles
 from tests.web.conftest import Client
 

@@ -3,10 +3,10 @@
 from contextlib import closing
 
 from map3d.catalogue import RenderingRecord, Workspace
-from map3d.renderings.track_stores import open_track
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.naming import block_of, tiles_of_block
 from map3d.tiles.tile_store import StoredTile
+from map3d.tiles.track_stores import open_track
 from map3d.types import TileId
 
 VIEW = "35-40"

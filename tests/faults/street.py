@@ -15,10 +15,10 @@ from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources
 from map3d.jobs.run import Run
 from map3d.jobs.run_settings import RunSettings
-from map3d.renderings.build import BUILD_BYTES, build
-from map3d.renderings.create import create_rendering
-from map3d.renderings.track_stores import open_track
+from map3d.lifecycle.create_rendering import create_rendering
 from map3d.requests import CreateRendering
+from map3d.scenes.build import BUILD_BYTES, build
+from map3d.tiles.track_stores import open_track
 from map3d.types import ViewAngles
 
 SCENE: Final = "street"

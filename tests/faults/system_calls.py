@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from map3d.catalogue import State, Workspace
-from map3d.renderings.build import open_scene
 from map3d.renderings.plan import plan_jobs
 from map3d.renderings.render_task import RenderTask
+from map3d.scenes.build import open_scene
 from map3d.subprocess import Message
 from map3d.tiles.sqlite_store import SqliteTileStore
 from tests.faults.commit_one import WORKER

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import Workspace
-from map3d.renderings.build import BUILD_BYTES, build
+from map3d.scenes.build import BUILD_BYTES, build
 
 MADE_UP = Path(__file__).parent / "made_up"
 ROOT = Path(__file__).parents[2]

@@ -8,7 +8,7 @@ import pytest
 from map3d import _core
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids
 from map3d.ingest.importing import choose_origin
-from map3d.renderings.scene_files import check_file
+from map3d.scenes.scene_files import check_file
 from tests.ingest.meshes import write_asset
 
 POINTS = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (5, 5, 5), (6, 5, 5), (5, 7, 9)]

@@ -115,8 +115,8 @@ def test_a_cut_city_keeps_what_was_read(tmp_path: Path, run: Run) -> None:
     packed.write_bytes(data[: len(data) * 2 // 3])
     status, out, err = run("site", "city", "-o", "site", "--res", "1", "--view", "0-90", "--workers", "1")
     assert status == 0, err
-    assert "gzip file cut or damaged: town: after " in out
-    assert "document broken: town: at byte " in out
+    assert "The packed file is cut off or damaged; what could be unpacked is kept. Example: town: after " in out
+    assert "The file breaks off; what comes before is kept. Example: town: at byte " in out
     (tmp_path / "bad").mkdir()
     (tmp_path / "bad" / "house.obj").write_text(house(0, 0, 6) + "".join(f"v {k * 0.37:.3f} {k * k % 977} 0\n" for k in range(3000)))
     model = pack(tmp_path / "bad" / "house.obj")

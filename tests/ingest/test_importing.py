@@ -13,7 +13,8 @@ from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported, import_file
 from map3d.ingest.sources import find_sources
 from map3d.registry import Registry
-from map3d.renderings.scene_files import check_file
+from map3d.scenes.scene_files import check_file
+from tests.findings import skipped, warned
 from tests.ingest.terrain.rasters import hills, write
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
@@ -121,7 +122,7 @@ def test_a_broken_building_is_skipped_and_counted(workspace: Workspace, catalogu
     text = gml(("B1", "1 2 3 4 5", UTM), ("B2", UTM_RING, UTM), ("B3", "0 0 0 0 0 0 0 0 0 0 0 0", UTM))
     done = add(workspace, catalogue, tmp_path / "a.gml", text)
     assert list(boxes(workspace)) == ["B2"]
-    assert sum(done.report["skipped"].values()) >= 2
+    assert sum(skipped(done.report).values()) >= 2
     with pytest.raises(ImportFailed):
         add(workspace, catalogue, tmp_path / "b.gml", text, ImportOptions(strict=True))
     assert [asset.name for asset in catalogue.assets("town")] == ["a"]
@@ -166,7 +167,7 @@ def test_a_raster_takes_the_stated_crs(workspace: Workspace, catalogue: Catalogu
     report = import_file(workspace, catalogue, "town", source, ImportOptions(crs="EPSG:25832")).report
     crs = catalogue.scene("town").crs
     assert crs is not None
-    assert (crs.epsg, report["placing"]["from"], report["warnings"]) == (25832, "ETRS89 / UTM zone 32N", [])
+    assert (crs.epsg, report["placing"]["from"], warned(report)) == (25832, "ETRS89 / UTM zone 32N", [])
 
 
 def test_a_local_scene_refuses_a_raster_with_a_stated_crs(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:
@@ -198,11 +199,11 @@ def test_rooms_are_drawn_on_request(workspace: Workspace, catalogue: Catalogue, 
     room = f"<bldg:interiorRoom><bldg:Room><bldg:lod2{surface}</bldg:Room></bldg:interiorRoom></bldg:Building>"
     text = gml(("B1", UTM_RING, UTM)).replace("</bldg:Building>", room.format(ring=UTM_RING.replace("691010", "691011"), srs=""))
     done = add(workspace, catalogue, tmp_path / "a.gml", text)
-    assert (done.triangles, done.report["skipped"]) == (2, {"polygon of an interior": 1})
-    (said,) = [warning for warning in done.report["warnings"] if warning["reason"] == "polygons of interiors are not drawn"]
-    assert (said["example"], said["scope"]) == ("1; --interiors draws them", "file")
+    assert (done.triangles, skipped(done.report)) == (2, {"polygon-of-interior": 1})
+    (said,) = [warning for warning in warned(done.report) if warning["code"] == "interiors-not-drawn"]
+    assert said["example"] == "1; --interiors draws them"
     done = add(workspace, catalogue, tmp_path / "a.gml", text, ImportOptions(interiors=True))
-    assert (done.triangles, done.replaced, done.report["skipped"]) == (4, True, {})
+    assert (done.triangles, done.replaced, skipped(done.report)) == (4, True, {})
 
 
 def test_codes_have_the_names_of_their_list(workspace: Workspace, catalogue: Catalogue, tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported, import_file
 from map3d.ingest.sources import find_sources
 from map3d.registry import Registry
+from tests.findings import skipped, warned
 
 MODEL = """<core:CityModel xmlns:core="http://www.opengis.net/citygml/2.0" xmlns:bldg="http://www.opengis.net/citygml/building/2.0"
  xmlns:gml="http://www.opengis.net/gml" xmlns:veg="http://www.opengis.net/citygml/vegetation/2.0">{envelope}{members}</core:CityModel>"""
@@ -64,7 +65,7 @@ def add(tmp_path: Path, text: str, options: ImportOptions | None = None) -> tupl
 
 
 def warnings(done: Imported) -> list[str]:
-    return [warning["reason"] for warning in done.report["warnings"]]
+    return [warning["code"] for warning in warned(done.report)]
 
 
 def expected(dx: float = 0.0) -> np.ndarray[Any, Any]:
@@ -77,16 +78,16 @@ def test_geometry_in_another_crs_than_the_envelope_is_transformed(tmp_path: Path
     done, boxes = add(tmp_path, text)
     assert np.array_equal(boxes["here"], expected())
     assert np.allclose(boxes["there"], expected(50.0), atol=5.0), "within the accuracy of the transformation between the datums"
-    (said,) = done.report["warnings"]
-    assert said["reason"] == "parts in another coordinate system than the rest of the file, transformed"
+    (said,) = warned(done.report)
+    assert said["code"] == "parts-in-other-crs"
     assert (said["count"], said["example"].startswith("EPSG:31468: from DHDN / 3-degree Gauss-Kruger zone 4 to ETRS89 / UTM zone 32N")) == (2, True)
-    assert (done.triangles, done.report["skipped"], done.report["placing"]["from"]) == (4, {}, "ETRS89 / UTM zone 32N + DHHN2016 height")
+    assert (done.triangles, skipped(done.report), done.report["placing"]["from"]) == (4, {}, "ETRS89 / UTM zone 32N + DHHN2016 height")
 
 
 def test_an_envelope_alone_in_its_crs_says_nothing(tmp_path: Path) -> None:
     done, boxes = add(tmp_path, model(building("b", ring(), "EPSG:25832"), envelope="EPSG:4326"))
     assert np.array_equal(boxes["b"], expected())
-    assert (done.report["crs"], done.report["placing"]["from"], done.report["warnings"]) == ("EPSG:25832", "ETRS89 / UTM zone 32N", [])
+    assert (done.report["crs"], done.report["placing"]["from"], warned(done.report)) == ("EPSG:25832", "ETRS89 / UTM zone 32N", [])
     _, boxes = add(tmp_path / "other", model(building("b", ring(), "EPSG:25832"), envelope="#unknown"))
     assert np.array_equal(boxes["b"], expected()), "no part is in the unknown one"
 
@@ -104,7 +105,7 @@ def test_an_envelope_alone_in_its_crs_says_nothing(tmp_path: Path) -> None:
 def test_equivalent_names_and_the_horizontal_part_are_the_same_crs(tmp_path: Path, srs: str) -> None:
     done, boxes = add(tmp_path, model(building("a", ring()), building("b", ring(dx=20.0), srs)))
     assert np.array_equal(boxes["b"], expected(20.0))
-    assert (done.report["warnings"], done.report["skipped"]) == ([], {})
+    assert (warned(done.report), skipped(done.report)) == ([], {})
 
 
 def test_each_name_has_its_order_of_axes(tmp_path: Path) -> None:
@@ -115,7 +116,7 @@ def test_each_name_has_its_order_of_axes(tmp_path: Path) -> None:
     )
     done, boxes = add(tmp_path, text)
     assert np.allclose(boxes["c"][0] - boxes["b"][0], [50.0, 0.0, 0.0], atol=0.01)
-    assert done.report["skipped"] == {}
+    assert skipped(done.report) == {}
 
 
 def test_reference_points_are_in_their_own_crs(tmp_path: Path) -> None:
@@ -129,8 +130,8 @@ def test_reference_points_are_in_their_own_crs(tmp_path: Path) -> None:
     assert np.allclose(boxes["near"][0], [691030.0, 5336010.0, 510.0])
     assert np.allclose(boxes["far"][0], [691050.0, 5336010.0, 510.0], atol=5.0)
     assert "lost" not in boxes
-    assert done.report["skipped"]["part in an unusable coordinate system = EPSG:99999"] == 1
-    assert "parts in another coordinate system than the rest of the file, transformed" in warnings(done)
+    assert [item["values"] for item in done.report["findings"] if item["code"] == "part-crs-unusable"] == [{"name": "EPSG:99999"}]
+    assert "parts-in-other-crs" in warnings(done)
 
 
 def test_parts_in_a_crs_that_is_not_usable_are_skipped_with_its_name(tmp_path: Path) -> None:
@@ -139,10 +140,11 @@ def test_parts_in_a_crs_that_is_not_usable_are_skipped_with_its_name(tmp_path: P
     done, boxes = add(tmp_path, model(building("a", ring()), degrees, unknown))
     assert set(boxes) == {"a"}
     names = ("EPSG:4326", "urn:adv:crs:NOWHERE")
-    assert done.report["skipped"] == {f"part in an unusable coordinate system = {name}": 2 for name in names}
-    examples = {warning["reason"]: warning["example"] for warning in done.report["warnings"]}
-    assert re.search("are no degrees", examples[f"skipped: part in an unusable coordinate system = {names[0]}"])
-    assert re.search("unknown CRS 'urn:adv:crs:NOWHERE'", examples[f"skipped: part in an unusable coordinate system = {names[1]}"])
+    unusable = [item for item in done.report["findings"] if item["code"] == "part-crs-unusable"]
+    assert {item["values"]["name"]: item["count"] for item in unusable} == dict.fromkeys(names, 2)
+    examples = {item["values"]["name"]: item["example"] for item in unusable}
+    assert re.search("are no degrees", examples[names[0]])
+    assert re.search("unknown CRS 'urn:adv:crs:NOWHERE'", examples[names[1]])
 
 
 def test_a_strict_import_refuses_what_would_be_skipped(tmp_path: Path) -> None:
@@ -160,8 +162,8 @@ def test_the_crs_of_the_user_counts_for_all_parts(tmp_path: Path) -> None:
     text = model(building("a", ring(), "EPSG:31468"), building("b", ring(dx=20.0), "EPSG:4326"), building("c", ring(dx=40.0), "urn:adv:crs:NOWHERE"))
     done, boxes = add(tmp_path, text, ImportOptions(crs="EPSG:25832"))
     assert np.array_equal(boxes["b"], expected(20.0))
-    (said,) = done.report["warnings"]
+    (said,) = warned(done.report)
     assert said["example"] == "EPSG:31468, EPSG:4326, urn:adv:crs:NOWHERE; read as EPSG:25832"
     same = text.replace("EPSG:4326", "EPSG:31468").replace("urn:adv:crs:NOWHERE", "EPSG::31468")
     done, _ = add(tmp_path / "same", same, ImportOptions(crs="EPSG:25832"))
-    assert done.report["warnings"] == []
+    assert warned(done.report) == []

@@ -19,7 +19,8 @@ from map3d.errors import ImportFailed
 from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.registry import Registry
-from map3d.renderings.site_files import ImportSummary, SiteFiles, update_files
+from map3d.site.files import ImportSummary, SiteFiles, update_files
+from tests.findings import skipped, warned
 
 EAST, NORTH, CELL_M = 691000.0, 5336000.0, 25.0
 COLUMNS, ROWS = 6, 5
@@ -37,7 +38,7 @@ MODEL = """<core:CityModel xmlns:core="http://www.opengis.net/citygml/2.0" xmlns
 <gml:offsetVector>{v}</gml:offsetVector></gml:RectifiedGrid></gml:rectifiedGridDomain><gml:rangeSet><gml:File><gml:rangeParameters/>
 <gml:fileName>{file}</gml:fileName><gml:fileStructure>Record Interleaved</gml:fileStructure></gml:File></gml:rangeSet></gml:RectifiedGridCoverage>
 </dem:grid></dem:RasterRelief></dem:reliefComponent></dem:ReliefFeature></core:cityObjectMember></core:CityModel>"""
-AS_TERRAIN = "RasterRelief: raster read as terrain"
+AS_TERRAIN = "relief-raster-read-as-terrain"
 
 
 def write_model(
@@ -88,9 +89,9 @@ def add(tmp_path: Path, files: Sequence[Path], options: ImportOptions | None = N
     return done, {name: np.array(box) + origin for name, box in boxes.items()}
 
 
-def warned(done: FilesImport, asset: str) -> dict[str, str]:
+def warned_of(done: FilesImport, asset: str) -> dict[str, str]:
     (report,) = (item.report for item in done.imported if item.asset == asset)
-    return {warning["reason"]: warning["example"] for warning in report["warnings"]}
+    return {warning["code"]: warning["example"] for warning in warned(report)}
 
 
 GRID_BOX = np.array([(EAST - 12.5, NORTH - 112.5, 500.0), (EAST + 137.5, NORTH + 12.5, 545.0)])
@@ -102,8 +103,8 @@ def test_a_raster_without_a_georeference_lies_where_its_grid_says(tmp_path: Path
     done, boxes = add(tmp_path, [write_model(tmp_path / "city" / "town.gml")])
     assert [item.asset for item in done.imported] == ["town", "dem"]
     assert np.array_equal(boxes["dem"], GRID_BOX)
-    assert warned(done, "town") == {AS_TERRAIN: "dem.tif"}
-    assert warned(done, "dem") == {}
+    assert warned_of(done, "town") == {AS_TERRAIN: "dem.tif"}
+    assert warned_of(done, "dem") == {}
     assert not list((tmp_path / "workspace" / "scenes" / "town" / "assets" / "dem").glob("placed"))
 
 
@@ -124,18 +125,16 @@ def test_a_raster_of_its_own_place_stays_there(tmp_path: Path) -> None:
     here = Affine(CELL_M, 0, EAST - 12.5, 0, -CELL_M, NORTH + 12.5)
     write_raster(tmp_path / "equal" / "dem.tif", here, "EPSG:25832")
     done, boxes = add(tmp_path / "equal", [write_model(tmp_path / "equal" / "town.gml")])
-    assert (warned(done, "dem"), np.array_equal(boxes["dem"], GRID_BOX)) == ({}, True)
+    assert (warned_of(done, "dem"), np.array_equal(boxes["dem"], GRID_BOX)) == ({}, True)
 
     write_raster(tmp_path / "other" / "dem.tif", Affine(CELL_M, 0, EAST + 987.5, 0, -CELL_M, NORTH + 12.5), "EPSG:25832")
     done, boxes = add(tmp_path / "other", [write_model(tmp_path / "other" / "town.gml")])
-    assert warned(done, "dem") == {
-        "RasterRelief: raster in another place than its grid, read in its own": "dem.tif: 1,000 apart, in units of its CRS"
-    }
+    assert warned_of(done, "dem") == {"relief-raster-elsewhere": "dem.tif: 1,000 apart, in units of its CRS"}
     assert np.array_equal(boxes["dem"], GRID_BOX + np.array([1000.0, 0.0, 0.0]))
 
     write_raster(tmp_path / "bare" / "dem.tif", here)
     done, boxes = add(tmp_path / "bare", [write_model(tmp_path / "bare" / "town.gml", house="")])
-    assert (warned(done, "dem"), np.array_equal(boxes["dem"], GRID_BOX)) == ({}, True), "its CRS is that of the grid"
+    assert (warned_of(done, "dem"), np.array_equal(boxes["dem"], GRID_BOX)) == ({}, True), "its CRS is that of the grid"
 
 
 def test_a_document_of_heights_alone_is_terrain(tmp_path: Path) -> None:
@@ -164,11 +163,11 @@ def test_a_photo_is_draped_over_the_heights(tmp_path: Path) -> None:
 
 
 def test_rasters_that_do_not_fit_are_named(tmp_path: Path) -> None:
-    with pytest.raises(ImportFailed, match=r"1 × RasterRelief: file not found \(dem\.tif\)"):
+    with pytest.raises(ImportFailed, match=r"Rasters of heights not found: 1\. .* Example: dem\.tif"):
         add(tmp_path / "missing", [write_model(tmp_path / "missing" / "town.gml", house="")])
     done, _ = add(tmp_path / "beside", [write_model(tmp_path / "beside" / "town.gml")])
     (town,) = done.imported
-    assert (town.report["skipped"], town.report["missing_files"]) == ({"RasterRelief: file not found": 1}, ["dem.tif"])
+    assert (skipped(town.report), town.report["missing_files"]) == ({"relief-file-not-found": 1}, ["dem.tif"])
 
     write_raster(tmp_path / "size" / "dem.tif")
     done, _ = add(tmp_path / "size", [write_model(tmp_path / "size" / "town.gml", columns=9)])

@@ -17,6 +17,7 @@ from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported, import_file
 from map3d.ingest.sources import find_sources
 from map3d.ingest.texture_places import transform_positions
+from tests.findings import skipped, warned
 
 MODEL = """<core:CityModel xmlns:core="http://www.opengis.net/citygml/2.0" xmlns:bldg="http://www.opengis.net/citygml/building/2.0"
  xmlns:gml="http://www.opengis.net/gml" xmlns:app="http://www.opengis.net/citygml/appearance/2.0"><gml:boundedBy><gml:Envelope srsName="{crs}">
@@ -29,7 +30,7 @@ MODEL = """<core:CityModel xmlns:core="http://www.opengis.net/citygml/2.0" xmlns
 </bldg:Building></core:cityObjectMember></core:CityModel>"""
 WIDTH, HEIGHT = 400, 300
 SURFACE = np.array([(691010.0, 5336010.0), (691050.0, 5336012.0), (691048.0, 5336040.0), (691012.0, 5336038.0)])
-UNUSED = "georeferenced texture in another coordinate system that no affine map reaches within half a pixel, not used"
+UNUSED = "georeferenced-texture-inexact"
 
 
 def to(crs: str, points: Any) -> Any:
@@ -93,7 +94,7 @@ def steps_in(srs: str, size_m: float) -> tuple[np.ndarray[Any, Any], np.ndarray[
 def test_the_texture_lies_where_pyproj_says(tmp_path: Path, srs: str, lat_first: bool, world_file: bool) -> None:
     origin, steps = steps_in(srs, 0.2)
     done, corners, uvs = add(tmp_path / "a", srs, origin, steps, lat_first=lat_first, world_file=world_file)
-    assert done.report["warnings"] == []
+    assert warned(done.report) == []
     assert len(uvs) == 6
     error_px = np.abs((uvs - expected(srs, origin, steps, corners)) * (WIDTH, HEIGHT)).max()
     assert error_px < 0.05, "an affine map is all but exact for 80 m"
@@ -103,23 +104,21 @@ def test_the_texture_lies_where_pyproj_says(tmp_path: Path, srs: str, lat_first:
 def test_a_texture_that_no_affine_map_reaches_is_not_used(tmp_path: Path) -> None:
     origin, steps = steps_in("EPSG:4326", 500.0)
     done, _, uvs = add(tmp_path / "a", "EPSG:4326", origin, steps, lat_first=True)
-    assert {warning["reason"]: warning["count"] for warning in done.report["warnings"]} == {UNUSED: 1}
+    assert {warning["code"]: warning["count"] for warning in warned(done.report)} == {UNUSED: 1}
     assert not uvs.any()
 
 
 def test_a_texture_elsewhere_is_counted_if_no_transformation_is_known(tmp_path: Path) -> None:
     origin, steps = steps_in("EPSG:31468", 0.2)
     done, _, _ = add(tmp_path / "a", "#local", origin, steps)
-    assert [warning["reason"] for warning in done.report["warnings"]] == [
-        "georeferenced texture in another coordinate system than the surface, not used"
-    ]
+    assert [warning["code"] for warning in warned(done.report)] == ["georeferenced-texture-in-other-crs"]
 
 
 def test_a_stated_crs_holds_for_textures_too(tmp_path: Path) -> None:
     origin, steps = steps_in("EPSG:25832", 0.2)
     done, corners, uvs = add(tmp_path / "a", "EPSG:31468", origin, steps, options=ImportOptions(crs="EPSG:25832"))
     assert np.abs((uvs - expected("EPSG:25832", origin, steps, corners)) * (WIDTH, HEIGHT)).max() < 0.01
-    assert done.report["skipped"] == {}
+    assert skipped(done.report) == {}
 
 
 def test_positions_are_in_the_order_of_documents() -> None:

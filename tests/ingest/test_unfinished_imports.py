@@ -17,7 +17,7 @@ from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources
 from map3d.registry import Registry
-from map3d.renderings.build import BUILD_BYTES, build, is_stale
+from map3d.scenes.build import BUILD_BYTES, build, is_stale
 from map3d.verify.findings import Findings
 from map3d.verify.rendering_checks import verify_scene
 

@@ -19,7 +19,7 @@ from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.sources import find_sources
 from map3d.ingest.virtual_raster import check_virtual_raster, find_virtual_sources, is_checked
-from map3d.renderings.site_files import SiteFiles, update_files
+from map3d.site.files import SiteFiles, update_files
 from tests.ingest.terrain.rasters import hills, write
 
 OPERATOR = ImportOptions(virtual_rasters=True)

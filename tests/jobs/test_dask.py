@@ -15,7 +15,7 @@ import pytest
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 from map3d.catalogue import Catalogue, State, Workspace
 from map3d.errors import BadRequest
-from map3d.jobs.dask_pool import DaskPools
+from map3d.jobs.dask.pool import DaskPools
 from map3d.jobs.events import JobDone, Planned, RunEvent, WorkerExited
 from map3d.jobs.run import Run, RunResult
 from map3d.jobs.run_settings import RunSettings

@@ -11,11 +11,11 @@ import pytest
 
 from map3d.catalogue import Job, State
 from map3d.errors import LimitExceeded, Unavailable
-from map3d.jobs.demands import Demand, Demands
-from map3d.jobs.on_demand import OnDemand
-from map3d.jobs.on_demand_cache import OnDemandCache
-from map3d.jobs.on_demand_worker import OnDemandSettings, check_can_be_done
-from map3d.renderings.track_stores import open_track
+from map3d.jobs.on_demand.block_requests import BlockRequest, BlockRequests
+from map3d.jobs.on_demand.cache import OnDemandCache
+from map3d.jobs.on_demand.on_demand import OnDemand
+from map3d.jobs.on_demand.worker import OnDemandSettings, check_can_be_done
+from map3d.tiles.track_stores import open_track
 from map3d.types import BlockId
 from tests.jobs.town import ENTRY, TIMEOUTS, VIEW, Town, planned_jobs
 
@@ -47,7 +47,7 @@ def job_of(town: Town, block: BlockId) -> Job:
     return job
 
 
-def ask(town: Town, one: OnDemand, block: BlockId) -> Demand:
+def ask(town: Town, one: OnDemand, block: BlockId) -> BlockRequest:
     return one.ask(job_of(town, block))
 
 
@@ -126,7 +126,7 @@ def test_too_many_blocks_below_are_refused(town: Town) -> None:
 
 
 def test_the_queue_is_bounded() -> None:
-    demands = Demands(2)
+    demands = BlockRequests(2)
     first = demands.add(("r", VIEW, BlockId(3, 0, 0)), "base")
     demands.add(("r", VIEW, BlockId(3, 1, 0)), "base")
     assert demands.add(("r", VIEW, BlockId(3, 0, 0)), "base") is first
@@ -138,7 +138,7 @@ def test_the_queue_is_bounded() -> None:
 
 
 def test_a_demand_without_clients_is_dropped() -> None:
-    demands = Demands(4)
+    demands = BlockRequests(4)
     demand = demands.add(("r", VIEW, TOP), "reduce")
     demands.add(("r", VIEW, TOP), "reduce")
     demands.leave(demand, keep=False)

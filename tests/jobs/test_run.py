@@ -15,7 +15,7 @@ from map3d.errors import BadRequest, OutsideFrame
 from map3d.jobs.run import Run, RunPlan, RunResult
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.timeouts import Timeouts
-from map3d.renderings.create import add_layers, add_views
+from map3d.lifecycle.create_rendering import add_layers, add_views
 from map3d.renderings.manifest_writer import stored_occupancy, write_manifest
 from map3d.renderings.plan import planned_occupancy
 from map3d.requests import AddLayers

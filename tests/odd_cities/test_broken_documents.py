@@ -42,7 +42,7 @@ def test_a_cut_document_keeps_what_was_read(tmp_path: Path, run: Run) -> None:
     status, out, err = run("site", "city", "-o", "site", "--res", "1", "--view", "0-90", "--workers", "1", "--crs", "local")
     assert status == 0, err
     line = text[:cut].count("\n") + 1
-    assert f"document broken: town: at byte {cut}, line {line} (the document ends inside " in out
+    assert f"The file breaks off; what comes before is kept. Example: town: at byte {cut}, line {line} (the document ends inside " in out
     assert "elements); what comes before is kept\n" in out
     catalogue = Workspace(tmp_path / "workspace").open_catalogue()
     (asset,) = catalogue.assets("city")
@@ -56,7 +56,7 @@ def test_letters_of_another_encoding_arrive(tmp_path: Path, run: Run) -> None:
     assert run("create-scene", "town")[0] == 0
     status, out, _ = run("add-files", "town", "town.gml", "--crs", "local")
     assert status == 0
-    assert "town: not UTF-8 as declared; other bytes read as Windows-1252: byte " in out
+    assert "The file is not in UTF-8 as it claims; other bytes are read as Windows-1252. Example: byte 349" in out
     with Registry(Workspace(tmp_path / "workspace").registry_path("town")) as registry:
         assert {item.name for item in registry.objects()} == {f"Mühle-{name}" for name, _ in houses()}
 

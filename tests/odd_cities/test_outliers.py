@@ -9,8 +9,8 @@ import pytest
 
 from map3d.catalogue import Workspace
 from map3d.registry import Registry
-from map3d.renderings.build import open_scene
-from map3d.renderings.outliers import read_outliers
+from map3d.scenes.build import open_scene
+from map3d.scenes.outliers import read_outliers
 from tests.cli.towns import Run
 from tests.odd_cities import strays
 from tests.odd_cities.towns import MUNICH, at, world_boxes, write_citygml

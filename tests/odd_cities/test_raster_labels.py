@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from map3d.errors import CrsError
+from tests.findings import warned
 from tests.ingest.terrain.rasters import from_bounds, hills, write
 from tests.odd_cities.test_axis_order import add
 from tests.odd_cities.towns import MUNICH, at, world_boxes, write_citygml
@@ -17,23 +18,23 @@ UTM = at(*MUNICH, "EPSG:25832")
 def test_a_raster_without_crs_alone_is_in_local_metres_and_says_so(tmp_path: Path) -> None:
     dem = write(tmp_path / "dem.tif", hills(4, 4), crs=None)
     _, done = add(tmp_path, dem)
-    (warning,) = done.report["warnings"]
-    assert warning["reason"] == "raster without CRS, read as local metres"
+    (warning,) = warned(done.report)
+    assert warning["code"] == "raster-read-as-local"
     assert warning["example"] == "dem.tif; name its CRS with --crs, e.g. --crs EPSG:25832"
     _, done = add(tmp_path, dem, "stated", crs="local")
-    assert done.report["warnings"] == []
+    assert warned(done.report) == []
 
 
 def test_a_stated_crs_locates_a_raster_without_one(tmp_path: Path) -> None:
     _, done = add(tmp_path, write(tmp_path / "dem.tif", hills(4, 4), crs=None), crs="EPSG:25832")
-    assert done.report["warnings"] == []
+    assert warned(done.report) == []
     assert done.report["placing"]["place"].startswith("near Munich, Germany")
 
 
 def test_a_raster_without_crs_near_the_scene_takes_its_crs(tmp_path: Path) -> None:
     add(tmp_path, write_citygml(tmp_path / "town.gml", "EPSG:25832", UTM))
     workspace, done = add(tmp_path, write(tmp_path / "dem.tif", hills(4, 4), crs=None))
-    assert [warning["reason"] for warning in done.report["warnings"]] == ["raster without CRS, assumed the scene's"]
+    assert [warning["code"] for warning in warned(done.report)] == ["raster-crs-assumed"]
     assert world_boxes(workspace, "town")["dem-0-0"][0][:2] == (691_000.0, 5_335_996.0)
 
 
@@ -60,8 +61,8 @@ def test_a_raster_with_crs_far_from_a_local_scene_is_refused(tmp_path: Path) -> 
     ):
         add(tmp_path, write(tmp_path / "dem.tif", hills(4, 4)))
     _, done = add(tmp_path, tmp_path / "dem.tif", crs="local")
-    (warning,) = done.report["warnings"]
-    assert warning["reason"] == "raster far from the scene's content"
+    (warning,) = warned(done.report)
+    assert warning["code"] == "raster-far-from-scene"
 
 
 def test_a_raster_with_crs_whose_numbers_fit_a_local_scene_is_kept(tmp_path: Path) -> None:
@@ -69,13 +70,13 @@ def test_a_raster_with_crs_whose_numbers_fit_a_local_scene_is_kept(tmp_path: Pat
     (tmp_path / "town.obj").write_text("v 691000 5335990 510\nv 691008 5335990 510\nv 691008 5335998 510\nf 1 2 3\n")
     add(tmp_path, tmp_path / "town.obj")
     _, done = add(tmp_path, write(tmp_path / "dem.tif", hills(4, 4)))
-    (warning,) = done.report["warnings"]
-    assert warning["reason"] == "raster's CRS not used, because the scene is in local metres"
+    (warning,) = warned(done.report)
+    assert warning["code"] == "raster-crs-not-used"
     assert warning["example"].endswith("e.g. --crs EPSG:25832")
 
 
 def test_a_raster_outside_the_area_of_its_crs_is_warned_about(tmp_path: Path) -> None:
     _, done = add(tmp_path, write(tmp_path / "dem.tif", hills(4, 4), crs="EPSG:28992"))
-    (warning,) = done.report["warnings"]
-    assert (warning["reason"], warning["count"]) == ("corners of the raster outside the area of use of Amersfoort / RD New", 4)
+    (warning,) = warned(done.report)
+    assert (warning["code"], warning["values"], warning["count"]) == ("raster-outside-area-of-use", {"name": "Amersfoort / RD New"}, 4)
     assert warning["example"].startswith("dem.tif: 691000 5335996 is ")

@@ -12,6 +12,7 @@ from map3d.formats.citygml_links import find_document_links, find_geometry_docum
 from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.sources import find_sources, source_digest
+from tests.findings import warned
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
@@ -84,9 +85,9 @@ def test_a_folder_is_imported_with_the_geometry_and_appearances_that_its_files_s
     assert {one.asset: one.triangles for one in done.imported} == {"a": 4, "b": 2}
     assert (done.failed, done.left_alone) == ([], [])
     assert (textures_of(workspace, "a"), textures_of(workspace, "b")) == (1, 0)
-    (missing,) = (one.report["warnings"] for one in done.imported if one.asset == "b")
-    assert [(one["reason"], one["count"], one["example"]) for one in missing] == [("reference into another file: file not found", 1, "c.gml#gone")]
-    assert "warnings" not in done.imported[0].report or not done.imported[0].report["warnings"]
+    (missing,) = (warned(one.report) for one in done.imported if one.asset == "b")
+    assert [(one["code"], one["count"], one["example"]) for one in missing] == [("other-file-not-found", 1, "c.gml#gone")]
+    assert not warned(done.imported[0].report)
 
 
 def test_libraries_may_be_packed_and_refer_to_others(tmp_path: Path, workspace: Workspace) -> None:
@@ -151,8 +152,8 @@ def test_nothing_outside_the_given_folder_is_read(tmp_path: Path, workspace: Wor
     write(city / "tiles" / "b.gml", body)
     done = add(workspace, city / "tiles" / "b.gml", city)
     (report,) = (one.report for one in done.imported if one.asset == "b" and "b" in one.source)
-    assert (report["triangles"], report["warnings"][0]["count"]) == (2, 2)
-    assert report["warnings"][0]["reason"] == "reference into another file: file outside the given folder not read"
+    assert (report["triangles"], warned(report)[0]["count"]) == (2, 2)
+    assert warned(report)[0]["code"] == "other-file-outside-folder"
     assert find_document_links(city / "tiles" / "b.gml", city).geometry == frozenset()
 
 

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from map3d.catalogue import Workspace
-from map3d.renderings.resolution import SurfaceDetail, surface_detail
+from map3d.site.resolution import SurfaceDetail, surface_detail
 from tests.cli.towns import Run
 
 pytestmark = pytest.mark.whole
@@ -70,6 +70,6 @@ def test_face_with_a_bad_texture_index_keeps_its_geometry(run: Run, tmp_path: Pa
     run("create-scene", "town")
     status, out, err = run("add-files", "town", "land/quad.obj")
     assert status == 0, err
-    assert "2 × texture index out of range: face without texture, e.g. line 12" in out
-    assert "1 × normal index out of range: face without normals, e.g. line 13" in out
+    assert "Faces that refer to missing texture coordinates, drawn without a texture: 2. Example: line 12" in out
+    assert "Faces that refer to missing normals, which are computed instead: 1. Example: line 13" in out
     assert "quad   obj           1          5        1" in out

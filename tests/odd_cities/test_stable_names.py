@@ -9,7 +9,7 @@ from map3d.catalogue import SceneRecord, Workspace
 from map3d.ingest.import_files import import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.registry import Registry
-from map3d.renderings.site_files import ImportSummary, SiteFiles, update_files
+from map3d.site.files import ImportSummary, SiteFiles, update_files
 from tests.ingest.terrain.rasters import colours, hills
 from tests.ingest.terrain.rasters import write as write_raster
 from tests.odd_cities.towns import write_citygml

@@ -10,8 +10,8 @@ import pytest
 from map3d.catalogue import Workspace
 from map3d.errors import BadRequest
 from map3d.registry import Registry
-from map3d.renderings.build import open_scene
-from map3d.renderings.style import check_style, read_style
+from map3d.scenes.build import open_scene
+from map3d.scenes.style import check_style, read_style
 from tests.cli.towns import Run
 from tests.odd_cities.towns import write_citygml
 

@@ -7,6 +7,7 @@ import pytest
 from map3d.catalogue import SceneRecord, Workspace
 from map3d.ingest.import_files import import_files
 from map3d.ingest.import_options import ImportOptions
+from tests.findings import warned
 from tests.odd_cities.appearances import add_themes
 from tests.odd_cities.towns import write_citygml
 
@@ -22,5 +23,5 @@ def test_the_theme_with_the_most_textures_is_drawn(tmp_path: Path, theme: str | 
     (done,) = import_files(workspace, catalogue, "town", [path], ImportOptions(crs="local", theme=theme)).imported
     catalogue.close()
     assert len(list((workspace.asset_folder("town", "town") / "textures").glob("*"))) == textures
-    used = [warning["example"] for warning in done.report["warnings"] if warning["reason"] == "appearance theme used"]
+    used = [warning["example"] for warning in warned(done.report) if warning["code"] == "theme-used"]
     assert used == ([] if theme else ["photos"])

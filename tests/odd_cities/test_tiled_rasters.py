@@ -8,10 +8,12 @@ from affine import Affine
 from PIL import Image
 from pyproj import CRS, Transformer
 
+from map3d.ingest.findings import finding
 from map3d.ingest.sources import find_sources
 from map3d.ingest.terrain.terrain_import import import_terrain
 from map3d.ingest.terrain.terrain_options import TerrainOptions
 from tests.cli.towns import Run
+from tests.findings import skipped, warned
 from tests.ingest.terrain.rasters import NORTH, WEST, RecordingWriter, colours, from_bounds, hills, write
 from tests.odd_cities.test_axis_order import add
 from tests.odd_cities.towns import world_boxes
@@ -65,10 +67,10 @@ def test_a_missing_tile_is_a_gap(tmp_path: Path) -> None:
     heights = heights_at(writer)
     assert heights[(WEST + 10.5, NORTH - 30.5)] == pytest.approx(float(hills(40, 40)[0, 30, 10]), abs=1e-6)
     assert not any(x > WEST + 21 and y < NORTH - 21 for x, y in heights)
-    assert report["skipped"]["grid points without a height"] > 0
+    assert skipped(report)["grid-points-without-height"] > 0
     assert report["triangles"] == pytest.approx(2 * 41 * 41 * 0.75, rel=0.1)
     report, _, textures = imported(tmp_path / "b", dems, photos[1:])
-    assert report["warnings"] in ([], [{"reason": "tiles outside the photo", "count": 1, "example": "dem-0-0.tif"}])
+    assert warned(report) in ([], [finding("tiles-outside-photo", 1, "dem-0-0.tif")])
     assert len(textures) >= 8
 
 
@@ -108,7 +110,7 @@ def test_one_raster_far_from_the_others_is_left_out_and_named(tmp_path: Path) ->
     write_tiles(folder, "dem", hills(40, 40), 20)
     write(folder / "astray.tif", hills(20, 20), transform=Affine(1, 0, WEST - 3_000_000, 0, -1, NORTH))
     _, done = add(tmp_path, folder)
-    (warning,) = [one for one in done.report["warnings"] if one["reason"] == "raster left out, far from the others"]
+    (warning,) = [one for one in warned(done.report) if one["code"] == "raster-far-from-others"]
     assert (warning["count"], warning["example"].startswith("astray.tif lies 3,000 km from the other rasters")) == (1, True)
     assert done.report["rasters"] == {"elevation": 4, "imagery": 0}
     assert done.triangles == 2 * 41 * 41
@@ -123,8 +125,8 @@ def test_the_finer_raster_counts_where_resolutions_differ(tmp_path: Path) -> Non
     assert heights[(WEST + 60.5, NORTH - 60.5)] == 150.0
     assert heights[(WEST + 20.5, NORTH - 60.5)] == 100.0
     assert heights[(WEST + 100.5, NORTH - 100.5)] == 100.0
-    (warning,) = report["warnings"]
-    assert warning["reason"] == "rasters of different resolution"
+    (warning,) = warned(report)
+    assert warning["code"] == "raster-resolutions-differ"
     assert warning["example"] == "a.tif: pixels of 1, 4; all are read with pixels of 1"
 
 
@@ -182,7 +184,7 @@ def test_palette_grey_and_colour_photos_mix(tmp_path: Path) -> None:
     grey = write(tmp_path / "a.tif", np.full((1, 20, 20), 200, dtype=np.uint8))
     colour = write(tmp_path / "b.tif", colours(20, 20), transform=Affine(1, 0, WEST + 20, 0, -1, NORTH))
     report, writer, textures = imported(tmp_path / "asset", [], [grey, colour])
-    assert (len(writer.meshes), len(textures), report["warnings"]) == (1, 1, [])
+    assert (len(writer.meshes), len(textures), warned(report)) == (1, 1, [])
 
 
 def test_rasters_below_a_folder_are_one_source_and_given_ones_are_named_after_the_first(tmp_path: Path) -> None:
@@ -217,7 +219,7 @@ def test_tiles_added_one_after_another_are_all_there(tmp_path: Path) -> None:
 def test_a_stated_crs_holds_for_every_tile(tmp_path: Path) -> None:
     write_tiles(tmp_path / "tiles", "dem", hills(20, 40), 20, crs=None)
     _, done = add(tmp_path, tmp_path / "tiles", crs="EPSG:25832")
-    assert done.report["warnings"] == []
+    assert warned(done.report) == []
     assert done.report["placing"]["from"] == "ETRS89 / UTM zone 32N"
 
 

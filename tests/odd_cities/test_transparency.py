@@ -12,7 +12,10 @@ from tests.odd_cities.towns import write_citygml
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
 FACES = 16 * 6
-OPACITY_LINE = "transparency read as opacity: town: 1 of 2 materials would be invisible, and none opaque; --transparency as-is draws them so\n"
+OPACITY_LINE = (
+    "The transparency of the file is read as opacity, since all would be invisible otherwise. "
+    "Example: town: 1 of 2 materials would be invisible, and none opaque; --transparency as-is draws them so\n"
+)
 
 
 def write_town(folder: Path, walls: str, roofs: str) -> Path:
@@ -37,7 +40,8 @@ def test_transparency_is_decided_for_each_file(tmp_path: Path, run: Run, walls: 
     assert status == 0
     (imported,) = json.loads(out)["imported"]
     assert imported["triangles"] == 2 * drawn
-    about = [warning for warning in imported["report"]["warnings"] if "transparen" in warning["reason"] and warning.get("scope") == "file"]
+    codes = ("transparency-read-as-opacity", "transparent-surfaces-not-drawn")
+    about = [found for found in imported["report"]["findings"] if found["code"] in codes]
     assert [warning["example"] for warning in about] == ([] if said is None else [about[0]["example"]])
     assert said is None or about[0]["example"].startswith(said)
 
@@ -52,4 +56,4 @@ def test_site_says_how_it_read_transparency(tmp_path: Path, run: Run) -> None:
     assert status == 0, err
     assert "imported again" in out
     assert OPACITY_LINE not in out
-    assert "fully transparent surfaces are not drawn: town: 64; --transparency inverted draws them\n" in out
+    assert "The file has fully transparent surfaces, which are not drawn. Example: town: 64; --transparency inverted draws them\n" in out

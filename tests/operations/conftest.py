@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import OperationState
-from map3d.web.operation_sentences import find_sentence
+from map3d.web.studio.operation_sentences import find_sentence
 from tests.operations.scenario import STARTED, Scenario, kill, open_scenario, published, run_all, town_zip
 
 
@@ -20,7 +20,7 @@ def scenario(tmp_path: Path) -> Iterator[Scenario]:
     yield opened
     unknown = texts_without_sentence(opened)
     opened.catalogue.close()
-    assert unknown == [], "map3d.web.operation_sentences has every text, so that pages can translate it"
+    assert unknown == [], "map3d.web.studio.operation_sentences has every text, so that pages can translate it"
 
 
 def texts_without_sentence(scenario: Scenario) -> list[str]:

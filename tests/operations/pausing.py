@@ -11,9 +11,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from map3d.lifecycle import remove_rendering, remove_scene
 from map3d.operations import do_operation
 from map3d.operations.operation_report import OperationReport
-from map3d.renderings import remove_rendering, remove_scene
 from map3d.subprocess import Handler
 
 

@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from map3d.catalogue import Catalogue, OperationRecord, OperationState, Workspace
+from map3d.lifecycle.create_rendering import create_rendering
+from map3d.lifecycle.create_scene import create_scene
 from map3d.operations.operation_worker import OperationWorker
 from map3d.operations.request_operation import request_operation
 from map3d.operations.uploaded_files import uploads_folder
-from map3d.renderings.create import create_rendering
-from map3d.renderings.create_scene import create_scene
 from map3d.requests import CreateRendering, CreateScene
 from map3d.types import ViewAngles
 from map3d.uploads import Uploads

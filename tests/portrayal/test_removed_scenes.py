@@ -3,9 +3,9 @@
 import pytest
 
 from map3d.catalogue import Workspace
+from map3d.lifecycle.remove_scene import find_scene, finish_scene_removal, remove_scene
 from map3d.portrayal.service import PortrayalService
 from map3d.portrayal.tracer_pool import TracerPool
-from map3d.renderings.remove_scene import find_scene, finish_scene_removal, remove_scene
 from map3d.renderings.view_store import views_folder
 from tests.portrayal.conftest import FAKE, Ask
 from tests.portrayal.queries import PERSPECTIVE, get_view
@@ -21,7 +21,7 @@ def test_stored_views_go_with_their_scene(
     found = find_scene(workspace, catalogue, "village", with_renderings=True)
     if killed:
         with monkeypatch.context() as patch:
-            patch.setattr("map3d.renderings.remove_scene.remove_views", _die)
+            patch.setattr("map3d.lifecycle.remove_scene.remove_views", _die)
             with pytest.raises(KeyboardInterrupt):
                 remove_scene(workspace, catalogue, found)
         assert service._store.used_bytes() > 0

@@ -15,8 +15,8 @@ from map3d.catalogue import Workspace
 from map3d.portrayal.answers import BOUNDARY, Answer
 from map3d.portrayal.service import PortrayalService, ServiceRequest
 from map3d.portrayal.tracer_pool import TracerPool
-from map3d.renderings.track_stores import open_track
 from map3d.tiles.decode_tile import as_layer, find_layer
+from map3d.tiles.track_stores import open_track
 from tests.portrayal.conftest import ENDPOINT, FAKE, Ask
 from tests.portrayal.fake_tracer import CRASH_PX, SLOW_PX, STUCK_PX
 from tests.portrayal.queries import ORTHOGRAPHIC, PERSPECTIVE, get_view

@@ -10,10 +10,10 @@ from map3d.errors import Corrupt
 from map3d.publish import publish
 from map3d.publish.page_head import describe_page
 from map3d.publish.preview_picture import BACKGROUND, make_preview
-from map3d.renderings.track_stores import rendering_record
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import StoredTile
+from map3d.tiles.track_stores import rendering_record
 
 
 def manifest_of(workspace):

@@ -8,11 +8,13 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import Workspace
+from map3d.ingest.findings import Finding
+from map3d.messages import message
 from map3d.publish.page_head import VIEWER_POLICY
 from map3d.publish.report_page import report_files, report_page
 from map3d.registry import ObjectKind
-from map3d.renderings.file_contents import FileContents, Finding, Rasters, Textures
-from map3d.renderings.site_report import SiteReport, read_report, write_report
+from map3d.scenes.file_contents import FileContents, Rasters, Textures
+from map3d.site.report import SiteReport, read_report, write_report
 
 BOX = ((0.0, 0.0, 1.0), (100.0, 50.0, 9.0))
 HOSTILE = '<script src="https://evil.example/x.js"></script>&amp;"\'<img src=x onerror=alert(1)>'
@@ -30,7 +32,7 @@ TOWN = FileContents(
     triangles=56_789,
     outside=3,
     textures=Textures(646, 645, ("../textures/a.jpg",)),
-    findings=(Finding("polygon without area", 7, "house-1", skipped=True), Finding("axes swapped", 1, "11.5 48.1", whole_file=True)),
+    findings=(Finding(message("polygon-without-area"), 7, "house-1"), Finding(message("document-broken"), 1, "11.5 48.1")),
 )
 TERRAIN = replace(TOWN, asset="dem", source="a.tif", format="raster", rasters=Rasters(4, 1), textures=None, findings=(), outside=0)
 REPORT = SiteReport(
@@ -97,7 +99,8 @@ def test_the_page_accounts_for_everything() -> None:
         "Town", "2 files imported 1 not imported", "2,468 objects", "113,578 triangles 7 elements skipped", "646 textures 645 missing",
         "4,000 tile images", "5.0 MB", "near Munich, Germany", "ETRS89 / UTM zone 32N", "100 m × 50 m, heights 1.0 to 9.0 m",
         "2,468 building part (LoD 2)", "0.1 m per pixel, since finer pixels show nothing more", "took 4 min with 2 workers",
-        "7skipped polygon without areatown.gml: house-1", "1axes swappedtown.gml: 11.5 48.1", "left out 3 triangles",
+        "Skipped polygons without area: 7.town.gml: house-1", "The file breaks off; what comes before is kept.town.gml: 11.5 48.1",
+        "left out 3 triangles",
         "not importedcut.gmldocument broken at byte 17", "left alonetown.jsonCityJSON",
         "CityGML, 12.3 kB", "dem (5 rasters)", "4 rasters of elevation and 1 raster of imagery",
         "3 triangles far from the rest", "../textures/a.jpg, …",
@@ -119,7 +122,9 @@ def test_the_page_needs_no_network_and_runs_no_script() -> None:
 
 def test_names_from_files_are_text() -> None:
     """Each text that files determine contains markup; the elements are those of the harmless page."""
-    findings = tuple(replace(finding, reason=HOSTILE, example=HOSTILE) for finding in TOWN.findings)
+    findings = tuple(
+        replace(finding, reason=message("part-crs-unusable", name=f"{finding.count} {HOSTILE}"), example=HOSTILE) for finding in TOWN.findings
+    )
     kinds = (ObjectKind(HOSTILE, HOSTILE, 1_234, 1_200),)
     textures = Textures(646, 645, (HOSTILE,))
     town = replace(TOWN, asset=HOSTILE, source=HOSTILE, crs=HOSTILE, place=HOSTILE, kinds=kinds, textures=textures, findings=findings)

@@ -16,7 +16,7 @@ from map3d.geometry.frames import pin
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources
-from map3d.renderings.build import build, open_scene
+from map3d.scenes.build import build, open_scene
 from map3d.types import ViewAngles
 from tests.cli.towns import house
 

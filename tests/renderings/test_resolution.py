@@ -8,8 +8,8 @@ import pytest
 from map3d import _core
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
-from map3d.renderings.build import build
-from map3d.renderings.resolution import CITY_PIXEL_M, MAX_SMALL_BASE_TILES, SurfaceDetail, choose_resolution
+from map3d.scenes.build import build
+from map3d.site.resolution import CITY_PIXEL_M, MAX_SMALL_BASE_TILES, SurfaceDetail, choose_resolution
 from map3d.types import AO_RADIUS_M, ViewAngles
 
 VIEWS = [ViewAngles(look_at, 45) for look_at in (0, 90, 180, 270)]

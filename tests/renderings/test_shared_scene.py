@@ -18,14 +18,14 @@ from map3d.geometry.frames import pin
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources
+from map3d.lifecycle import remove_scene as remove_scene_module
+from map3d.lifecycle.remove_scene import find_scene, finish_scene_removal, remove_scene
 from map3d.object_store import ObjectStore, open_object_store
 from map3d.registry import Registry
-from map3d.renderings import remove_scene as remove_scene_module
-from map3d.renderings import scene_cache
-from map3d.renderings.build import BUILD_BYTES, build, is_stale, open_scene
-from map3d.renderings.remove_scene import find_scene, finish_scene_removal, remove_scene
-from map3d.renderings.scene_cache import LIMIT_VARIABLE, scene_in_use
-from map3d.renderings.shared_scene import read_shared, remove_shared
+from map3d.scenes import scene_cache
+from map3d.scenes.build import BUILD_BYTES, build, is_stale, open_scene
+from map3d.scenes.scene_cache import LIMIT_VARIABLE, scene_in_use
+from map3d.scenes.shared_scene import read_shared, remove_shared
 from map3d.types import ViewAngles
 from tests.cli.towns import house
 

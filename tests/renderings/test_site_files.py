@@ -17,8 +17,8 @@ from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources, source_digest
 from map3d.registry import Registry
-from map3d.renderings.build import BUILD_BYTES, build
-from map3d.renderings.site_files import ImportSummary, SiteFiles, reasons, update_files
+from map3d.scenes.build import BUILD_BYTES, build
+from map3d.site.files import ImportSummary, SiteFiles, reasons, update_files
 from tests.cli.towns import house
 
 

@@ -12,9 +12,9 @@ from pyproj import CRS, Geod, Proj, Transformer
 from map3d.catalogue import SceneCrs, SceneRecord
 from map3d.errors import BadRequest
 from map3d.geometry.crs import parse_crs
+from map3d.geometry.grid_north import GridNorth
 from map3d.geometry.sun import GeographicPosition, SunAngles, sun_angles
 from map3d.ingest.scene_crs import LOCAL, to_scene_crs
-from map3d.renderings.grid_north import GridNorth
 from map3d.renderings.layers import make_layers
 from map3d.requests import LayerDetails
 from map3d.types import DEFAULT_LAYERS, Box, Layer, Sun

@@ -19,7 +19,7 @@ from map3d.requests.param import FRONTS, RequestField, fields_of, help_text
 from map3d.requests.renderings import BuildAndCreateRendering
 from map3d.requests.scenes import BuildSteps
 from map3d.types import ViewAngles
-from map3d.web.api_schemas import SCHEMAS
+from map3d.web.api.schemas import SCHEMAS
 
 
 @dataclass(frozen=True)

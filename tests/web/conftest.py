@@ -8,7 +8,7 @@ import pytest
 
 from map3d.accounts import passwords
 from map3d.catalogue import Workspace
-from map3d.web.asgi_app import App, create_app
+from map3d.web.server.asgi_app import App, create_app
 from tests.web.workspaces import make_workspace
 
 

@@ -6,8 +6,8 @@ from html import unescape
 import pytest
 from flask import Flask
 
-from map3d.web.access import GUARD, PUBLIC_QUERY, SAFE_METHODS, SIGN_IN, public_query, requires
-from map3d.web.flask_app import GuardedFlask
+from map3d.web.http.access import GUARD, PUBLIC_QUERY, SAFE_METHODS, SIGN_IN, public_query, requires
+from map3d.web.server.flask_app import GuardedFlask
 from tests.web.accounts import PASSWORD, add_token, add_user, csrf_of, sign_in
 
 PUBLIC_QUERIES: set[str] = set()

@@ -14,7 +14,7 @@ from map3d.catalogue.states import MAX_ATTEMPTS
 from map3d.operations.operation_worker import OperationWorker
 from map3d.types import BlockId
 from map3d.uploads import Uploads
-from map3d.web.asgi_app import create_app
+from map3d.web.server.asgi_app import create_app
 from tests.cli.towns import house
 from tests.web.accounts import add_token, add_user
 from tests.web.conftest import Client

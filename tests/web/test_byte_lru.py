@@ -1,4 +1,4 @@
-from map3d.web.byte_lru import ENTRY_BYTES, ByteLru
+from map3d.web.http.byte_lru import ENTRY_BYTES, ByteLru
 
 
 def test_the_least_recently_used_entry_is_evicted_first():

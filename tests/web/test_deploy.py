@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from map3d.web.settings import load_settings
+from map3d.web.http.settings import load_settings
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 

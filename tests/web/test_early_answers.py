@@ -14,10 +14,10 @@ from granian import _futures
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.types import BlockId
-from map3d.web import open_stores
-from map3d.web.early_answers import answer_early
-from map3d.web.metrics import Metrics
-from map3d.web.observer import Observer
+from map3d.web.http import open_stores
+from map3d.web.server.early_answers import answer_early
+from map3d.web.server.metrics import Metrics
+from map3d.web.server.observer import Observer
 from tests.web.test_server import SCRIPT
 from tests.web.workspaces import OCCUPIED, ZMAX, put_block, rendering_record, store_shape
 
@@ -35,7 +35,9 @@ HEADERS = [
 ]
 MARKED = (
     """
-from map3d.web import asgi_app, manifest_route, open_stores
+from map3d.web.server import asgi_app
+from map3d.web.tiles import manifest_route
+from map3d.web.http import open_stores
 open_stores.RECHECK_S = manifest_route.RECHECK_S = 3600.0
 inner = asgi_app.App.__call__
 async def marked(self, scope, receive, send):
@@ -52,7 +54,7 @@ asgi_app.App.__call__ = marked
 @pytest.fixture
 def never_recheck(monkeypatch) -> None:
     monkeypatch.setattr(open_stores, "RECHECK_S", 3600.0)
-    monkeypatch.setattr("map3d.web.manifest_route.RECHECK_S", 3600.0)
+    monkeypatch.setattr("map3d.web.tiles.manifest_route.RECHECK_S", 3600.0)
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +122,7 @@ def test_other_methods_are_left_to_the_event_loop(client, never_recheck, method,
 def test_what_was_not_looked_at_lately_is_left_to_the_event_loop(client, monkeypatch, path):
     client.get(path)
     monkeypatch.setattr(open_stores, "RECHECK_S", 0.0)
-    monkeypatch.setattr("map3d.web.manifest_route.RECHECK_S", 0.0)
+    monkeypatch.setattr("map3d.web.tiles.manifest_route.RECHECK_S", 0.0)
     assert client.app.answer_early(scope_of(path)) is None
 
 

@@ -2,7 +2,7 @@
 
 from html import unescape
 
-from map3d.renderings.outliers import read_outliers
+from map3d.scenes.outliers import read_outliers
 from tests.odd_cities.strays import write_obj_town
 from tests.operations.archives import write_zip
 from tests.web.test_studio import studio  # noqa: F401

@@ -16,7 +16,7 @@ from map3d.errors import AlreadyExists, BadRequest, Corrupt, LimitExceeded, Map3
 from map3d.registry import NewObject, Registry
 from map3d.tiles import viewer_files
 from map3d.web import create_app
-from map3d.web.http_errors import status_of
+from map3d.web.http.http_errors import status_of
 from tests.web.workspaces import rendering_record
 
 
@@ -287,7 +287,7 @@ def test_the_health_check_answers(client):
 
 
 def test_an_unexpected_error_is_500_without_details(client, monkeypatch):
-    monkeypatch.setattr("map3d.web.page_routes.catalogue", lambda: 1 / 0)
+    monkeypatch.setattr("map3d.web.pages.page_routes.catalogue", lambda: 1 / 0)
     response = client.get("/healthz")
     assert (response.status_code, response.text) == (500, "internal server error; see the server log\n")
 

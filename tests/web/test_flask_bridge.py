@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from map3d.web.flask_bridge import FlaskBridge
+from map3d.web.server.flask_bridge import FlaskBridge
 
 CHUNKS = 50
 SCOPE = {

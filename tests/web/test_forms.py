@@ -4,10 +4,10 @@
 from html import unescape
 from html.parser import HTMLParser
 
-from map3d.renderings.create import create_rendering
+from map3d.lifecycle.create_rendering import create_rendering
 from map3d.requests import AddFiles, CreateRendering, CreateScene, Publish
 from map3d.requests.param import fields_of
-from map3d.web.forms import FORMS, more_fields
+from map3d.web.studio.forms import FORMS, more_fields
 from tests.cli.towns import house
 from tests.web.test_studio import built_town, town  # noqa: F401
 

@@ -13,8 +13,8 @@ from map3d.operations.operation_worker import OperationWorker
 from map3d.operations.uploaded_files import IMPORT_FOLDERS
 from map3d.types import BlockId
 from map3d.uploads import Uploads
-from map3d.web.asgi_app import create_app
-from map3d.web.host_folders import without_host_folders
+from map3d.web.http.host_folders import without_host_folders
+from map3d.web.server.asgi_app import create_app
 from tests.web.accounts import add_token, add_user
 from tests.web.conftest import Client
 from tests.web.test_api import Api
@@ -104,8 +104,8 @@ def test_errors_name_no_folder(api: Api, monkeypatch: pytest.MonkeyPatch, error:
     def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr("map3d.web.api_routes.create_scene", fail)
-    monkeypatch.setattr("map3d.web.page_routes.catalogue", fail)
+    monkeypatch.setattr("map3d.web.api.routes.create_scene", fail)
+    monkeypatch.setattr("map3d.web.pages.page_routes.catalogue", fail)
     problem = api.send("POST", "/scenes", json={"name": "x"}, headers={"accept": accept})
     page = api.client.get("/", headers={"accept": accept})
     assert (problem.status_code, page.status_code) == (status, status)

@@ -9,7 +9,7 @@ from map3d.errors import NotFound
 from map3d.publish.page_head import MAX_DESCRIPTION, MAX_TITLE
 from map3d.tiles import viewer_files
 from map3d.types import TileId
-from map3d.web.asgi_app import FLASK_THREADS
+from map3d.web.server.asgi_app import FLASK_THREADS
 from tests.web.workspaces import ZMAX, tile_bytes
 
 URL = f"/tiles/tea/0-45/color/{ZMAX}/7/7"

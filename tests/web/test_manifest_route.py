@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from map3d.web.manifest_route import ManifestRoute
+from map3d.web.tiles.manifest_route import ManifestRoute
 from tests.web.workspaces import rendering_record
 
 PATHS = ["/tiles/tea/rendering.json", "/view/tea/rendering.json"]
@@ -60,7 +60,7 @@ def test_other_methods_are_refused(client):
 
 
 def test_requests_at_the_same_time_share_one_reading_and_an_unchanged_file_is_not_read_again(workspace, monkeypatch):
-    monkeypatch.setattr("map3d.web.manifest_route.RECHECK_S", -1.0)
+    monkeypatch.setattr("map3d.web.tiles.manifest_route.RECHECK_S", -1.0)
     route, readings, bodies = ManifestRoute(workspace), [], []
     read = route._read
     monkeypatch.setattr(route, "_read", lambda name, known: readings.append(name) or read(name, known))

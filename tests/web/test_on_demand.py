@@ -16,11 +16,12 @@ import httpx
 import pytest
 
 from map3d.catalogue import State
-from map3d.jobs.on_demand_worker import OnDemandSettings
+from map3d.jobs.on_demand.worker import OnDemandSettings
 from map3d.tiles.occupancy import Occupancy
 from map3d.types import BlockId
-from map3d.web import create_app, tile_route
-from map3d.web.settings import ServerSettings
+from map3d.web import create_app
+from map3d.web.http.settings import ServerSettings
+from map3d.web.tiles import tile_route
 from tests.jobs.conftest import faults as faults
 from tests.jobs.conftest import town as town
 from tests.jobs.town import ENTRY, TIMEOUTS, VIEW, Town, planned_jobs
@@ -37,7 +38,7 @@ import sys
 from functools import partial
 from pathlib import Path
 from map3d.web import serve
-from map3d.web.settings import ServerSettings
+from map3d.web.http.settings import ServerSettings
 from tests.web.test_on_demand import SETTINGS
 if __name__ == "__main__":
     serve(Path(sys.argv[1]), port=0, workers=2, settings=ServerSettings(on_demand=SETTINGS), on_ready=partial(print, flush=True))
@@ -125,7 +126,7 @@ def test_a_stale_tile_is_served_while_its_block_is_rendered_anew(town: Town, cli
     client.app.on_demand._refresh()
     stale = client.get(url(town, 1))
     assert (stale.status_code, stale.headers["cache-control"], stale.content) == (200, "no-cache", old.content)
-    demand = client.app.on_demand.demands.find(("town-a", VIEW, BlockId(town.rendering.zmax - 3, 1, 0)))
+    demand = client.app.on_demand.requests.find(("town-a", VIEW, BlockId(town.rendering.zmax - 3, 1, 0)))
     if demand is not None:
         demand.ended.result(60)
     fresh = client.get(url(town, 1, version=2))

@@ -11,7 +11,7 @@ from flask import Flask
 
 import map3d
 from map3d.ingest.import_progress import ImportProgress
-from map3d.web.operation_sentences import NUMBERS, SENTENCES, find_sentence, operation_text
+from map3d.web.studio.operation_sentences import NUMBERS, SENTENCES, find_sentence, operation_text
 
 PACKAGE = Path(map3d.__file__).parent
 CRATES = PACKAGE.parents[1] / "crates"
@@ -22,7 +22,7 @@ MODULES = (
     "operations/operation_report.py",
     "operations/operation_worker.py",
     "jobs/event_messages.py",
-    "renderings/outlier_lines.py",
+    "scenes/outlier_lines.py",
     "ingest/import_progress.py",
 )
 FUNCTIONS = {"catalogue/operation_records.py": ("expiry_message", "with_gaps")}
@@ -144,12 +144,11 @@ def german(text: str) -> str:
         ("removed scene town with 4 files, 1 rendering and 2 published folders, 0.5 MB",
          "Szene town entfernt, mit 4 Dateien, 1 Rendering und 2 veröffentlichte Ordner, 0,5 MB"),
         ("removed published/town, 3.0 MB", "published/town entfernt, 3 MB"),
-        ("dem: 12 × tiles outside the photo, e.g. dem.tif",
+        ("dem: Parts of the terrain outside the orthophoto or without data in it, in a plain colour: 12. Example: dem.tif",
          "dem: Teile des Geländes außerhalb des Orthofotos oder ohne Daten darin, in einer Farbe: 12. Beispiel: dem.tif"),
-        ("a: 3 × skipped: zero area, e.g. b", "a: Weggelassene Dreiecke ohne Fläche: 3. Beispiel: b"),
-        ("a: 3 × something new, e.g. b", "a: 3 × something new, z. B. b"),
-        ("failed: a.obj: no usable triangle in the file (skipped: 1 × zero area, 2 × something new)",
-         "fehlgeschlagen: a.obj: kein brauchbares Dreieck in der Datei. Weggelassene Dreiecke ohne Fläche: 1. 2 × something new."),
+        ("a: Triangles without area, left out: 3. Example: b", "a: Weggelassene Dreiecke ohne Fläche: 3. Beispiel: b"),
+        ("failed: a.obj: no usable triangle in the file; Triangles without area, left out: 1.",
+         "fehlgeschlagen: a.obj: kein brauchbares Dreieck in der Datei; Weggelassene Dreiecke ohne Fläche: 1."),
         ("v 0/0/1: attempt 2 failed (the subprocess did not respond within 60 s); the block is now todo",
          "v 0/0/1: Versuch 2 fehlgeschlagen (Der Prozess antwortete nicht innerhalb von 60 s); Zustand des Blocks: zu rendern"),
         ("failed: the disk is full", "fehlgeschlagen: the disk is full"),

@@ -12,12 +12,13 @@ from pathlib import Path
 import pytest
 
 import map3d.web
+from map3d import number_formats
 from map3d.catalogue import AssetRecord, PlannedJob, SceneCrs, SceneRecord
 from map3d.catalogue.records import LOCAL_CRS_NAME
 from map3d.operations.request_operation import request_operation
 from map3d.types import BlockId
-from map3d.web import create_app, page_formats
-from map3d.web.page_language import LANGUAGES
+from map3d.web import create_app
+from map3d.web.pages.language import LANGUAGES
 from tests.web.accounts import add_token, add_user
 from tests.web.conftest import Client
 
@@ -50,21 +51,25 @@ ROWS = [
 
 
 @pytest.mark.parametrize(("name", "values", "english", "german", "french"), ROWS)
-def test_every_format_in_every_language(monkeypatch, name, values, english, german, french):
+def test_every_format_in_every_language(name, values, english, german, french):
     for language, expected in (("en", english), ("de", german), ("fr", french)):
-        monkeypatch.setattr(page_formats, "language", lambda language=language: language)
-        assert getattr(page_formats, name)(*values) == expected, language
+        assert getattr(number_formats, name)(*values, language) == expected, language
 
 
 def test_every_language_of_pages_has_a_style():
-    assert set(LANGUAGES) <= set(page_formats.STYLES)
+    assert set(LANGUAGES) <= set(number_formats.STYLES)
 
 
 @pytest.fixture
 def filled(workspace):
     """The workspace with a file of many triangles, 3 planned blocks, a large published folder and a cancelled operation."""
     catalogue = workspace.open_catalogue()
-    report = {"objects": 12_345, "triangles": 1_234_567, "skipped": {"zero area": 2_345}, "placing": {"from": "A", "to": "B", "accuracy_m": 0.25}}
+    report = {
+        "objects": 12_345,
+        "triangles": 1_234_567,
+        "findings": [{"code": "zero-area", "count": 2_345, "example": ""}],
+        "placing": {"from": "A", "to": "B", "accuracy_m": 0.25},
+    }
     catalogue.put_asset(AssetRecord("town", "houses", "houses.gml", "citygml", "d", "s", report))
     catalogue.plan("tea", [PlannedJob("0-45", BlockId(1, x, 0), "base", x, "k", None) for x in range(3)])
     asked = request_operation(workspace, catalogue, "render", "tea", {}, "anna")

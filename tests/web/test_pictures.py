@@ -11,8 +11,8 @@ import segno
 from PIL import Image
 
 from map3d.tiles import viewer_files
-from map3d.web import picture_routes
-from map3d.web.flask_app import CONTENT_SECURITY_POLICY
+from map3d.web.server.flask_app import CONTENT_SECURITY_POLICY
+from map3d.web.tiles import picture_routes
 from tests.web.workspaces import make_workspace
 
 VIEW = "0-45/691010.5/5336020.2/505.0/3.25"
@@ -70,7 +70,7 @@ def test_other_addresses_are_refused(client, path, status):
 
 @pytest.mark.parametrize("name", ["view", "static", "tiles", "pictures", "ogc"])
 def test_a_rendering_may_have_the_name_of_another_address(tmp_path, name):
-    from map3d.web.asgi_app import create_app
+    from map3d.web.server.asgi_app import create_app
     from tests.web.conftest import Client
 
     client = Client(create_app(make_workspace(tmp_path / "ws", name)))

@@ -9,9 +9,9 @@ from lxml import etree
 
 from map3d.catalogue import Workspace
 from map3d.portrayal.tracer_pool import TracerPool
-from map3d.web import portrayal_routes
-from map3d.web.asgi_app import create_app
-from map3d.web.settings import ServerSettings
+from map3d.web.http.settings import ServerSettings
+from map3d.web.server.asgi_app import create_app
+from map3d.web.services import portrayal_routes
 from tests.portrayal.queries import PERSPECTIVE, get_view
 from tests.portrayal.villages import make_villages
 from tests.web.conftest import Client

@@ -18,9 +18,9 @@ import httpx
 import pytest
 
 from map3d.web import create_app
-from map3d.web.metrics import COUNTERS, ROUTES, Metrics, render_metrics
-from map3d.web.server import find_port
-from map3d.web.settings import ServerSettings
+from map3d.web.http.settings import ServerSettings
+from map3d.web.server.metrics import COUNTERS, ROUTES, Metrics, render_metrics
+from map3d.web.server.serve import find_port
 from tests.web.conftest import Client
 
 ROOT = Path(__file__).parents[2]

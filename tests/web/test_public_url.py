@@ -7,8 +7,8 @@ import pytest
 from map3d.errors import BadRequest
 from map3d.tiles import viewer_files
 from map3d.web import create_app
-from map3d.web.public_url import public_url
-from map3d.web.settings import ServerSettings, check_public_url, settings_from_environment
+from map3d.web.http.public_url import public_url
+from map3d.web.http.settings import ServerSettings, check_public_url, settings_from_environment
 from tests.web.conftest import Client
 
 HOSTILE = {"host": "evil.example", "x-forwarded-host": "evil.example", "forwarded": "host=evil.example"}

@@ -8,8 +8,8 @@ from contextlib import ExitStack
 import httpx
 import pytest
 
-from map3d.web import request_body
-from map3d.web.request_body import read_body
+from map3d.web.server import request_body
+from map3d.web.server.request_body import read_body
 from tests.web.accounts import add_user, csrf_of
 from tests.web.test_upload_route import Served
 

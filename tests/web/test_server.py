@@ -12,7 +12,7 @@ import pytest
 
 from map3d.errors import BadRequest, NotFound
 from map3d.types import TileId
-from map3d.web.server import find_port, serve
+from map3d.web.server.serve import find_port, serve
 from tests.web.workspaces import every_tile, tile_bytes
 
 SCRIPT = """

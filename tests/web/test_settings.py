@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from map3d.errors import BadRequest, NotFound
-from map3d.web.settings import SETTINGS, ServerSettings, load_settings
+from map3d.web.http.settings import SETTINGS, ServerSettings, load_settings
 
 DOCS = Path(__file__).parents[2] / "docs" / "server.md"
 

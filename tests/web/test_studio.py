@@ -13,12 +13,12 @@ from werkzeug.datastructures import MultiDict
 
 from map3d.catalogue import OperationState, Workspace
 from map3d.operations.operation_worker import OperationWorker
-from map3d.renderings import preview_pool
-from map3d.renderings.preview_pool import PreviewPool
+from map3d.previews import preview_pool
+from map3d.previews.preview_pool import PreviewPool
 from map3d.types import DEFAULT_DATA
 from map3d.uploads import Uploads
 from map3d.web import create_app
-from map3d.web.rendering_form import read_form
+from map3d.web.studio.rendering_form import read_form
 from tests.cli.towns import house
 from tests.operations.archives import write_zip
 from tests.web.accounts import add_token, add_user

@@ -7,7 +7,8 @@ from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import content_hash
 from map3d.types import BlockId, TileId
-from map3d.web import open_stores, tile_route
+from map3d.web.http import open_stores
+from map3d.web.tiles import tile_route
 from tests.web.workspaces import ADDED, LAYERS, OCCUPIED, ZMAX, add_pass, every_tile, put_block, rendering_record, store_shape, tile_bytes
 
 TILE = TileId(ZMAX, 7, 7)

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import map3d.web
-from map3d.web.forms import FORMS, more_fields
+from map3d.web.studio.forms import FORMS, more_fields
 
 FOLDER = Path(map3d.web.__file__).parent
 CALL = re.compile(r"""(?:\b_|\btranslate|\bN_)\(\s*(?:"((?:[^"\\]|\\.)*)"|'((?:[^'\\]|\\.)*)')""")
@@ -14,7 +14,7 @@ FROM_DATA = {"editor", "viewer", "OBJ with textures", "Terrain"}
 
 
 def test_every_text_is_translated():
-    files = [*FOLDER.glob("templates/**/*.html"), *FOLDER.glob("*.py")]
+    files = [*FOLDER.glob("templates/**/*.html"), *FOLDER.glob("**/*.py")]
     texts = {(one or other).replace('\\"', '"') for file in files for one, other in CALL.findall(file.read_text("utf-8"))} | FROM_DATA
     texts |= {text for name in FORMS for one in more_fields(name) for text in (one.param.label, one.param.default) if re.search("[A-Za-z]{2}", text)}
     german = json.loads((FOLDER / "translations" / "de.json").read_text("utf-8"))

@@ -14,8 +14,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from map3d.web import upload_route
-from map3d.web.upload_route import parse_metadata
+from map3d.web.uploads import upload_route
+from map3d.web.uploads.upload_route import parse_metadata
 from tests.web.accounts import add_token, add_user, csrf_of, sign_in
 from tests.web.test_server import SCRIPT
 

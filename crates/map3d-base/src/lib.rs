@@ -11,6 +11,7 @@ pub mod isa;
 pub mod layers;
 pub mod limits;
 pub mod projection;
+pub mod reason;
 pub mod samples;
 pub mod tile;
 pub mod vec3;
@@ -23,6 +24,7 @@ pub use frame::{Frame, LayerSpec};
 pub use isa::Isa;
 pub use layers::{LayerFormat, LayerKind};
 pub use projection::{ParallelProjection, PerspectiveProjection, Projection};
+pub use reason::Reason;
 pub use vec3::{Box3, Vec3};
 pub use view::ViewAxes;
 

@@ -1,6 +1,7 @@
 //! Asset folders are read back as written; invalid triangles are skipped and counted.
 
 use map3d_base::Box3;
+use map3d_base::Reason;
 use map3d_base::asset::{AssetMesh, AssetReport, AssetWriter, Batch, Materials, Rank};
 
 fn folder(name: &str) -> std::path::PathBuf {
@@ -56,10 +57,8 @@ fn invalid_triangles_are_skipped_and_counted() {
     writer.append(&batch(points, vec![[0, 1, 2], [0, 1, 3], [0, 2, 4], [0, 2, 5], [0, 1, 6], [0, 0, 1], [0, 1, 99]])).expect("append");
     let report = writer.finish(&Materials::default(), &[], AssetReport::default()).expect("finish");
     assert_eq!(report.triangles, 1);
-    let counts: Vec<u64> = report.skipped.values().copied().collect();
-    assert_eq!(counts.iter().sum::<u64>(), 6);
-    assert_eq!(report.skipped["zero area"], 2);
-    assert_eq!(report.skipped["coordinate is not a finite number"], 2);
+    assert_eq!(report.findings.iter().map(|finding| finding.count).sum::<u64>(), 6);
+    assert_eq!((report.count(Reason::ZeroArea), report.count(Reason::CoordinateNotFinite)), (2, 2));
     std::fs::remove_dir_all(dir).expect("clean up");
 }
 

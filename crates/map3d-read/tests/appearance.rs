@@ -97,8 +97,8 @@ fn first_theme_is_used_unless_another_is_requested() {
     assert_eq!(diffuse(&read_theme(Some("summer"))), RED);
     assert_eq!(diffuse(&read_theme(Some("winter"))), GREEN);
     assert_eq!(diffuse(&read_theme(Some("spring"))), [0.8, 0.8, 0.8, 1.0]);
-    assert!(read_theme(None).report.warnings.iter().any(|w| w.reason == "appearance theme used" && w.example == "summer"));
-    assert_eq!(read_theme(None).warned("another theme"), 1);
+    assert!(read_theme(None).report.findings.iter().any(|w| w.message.reason.code() == "theme-used" && w.example == "summer"));
+    assert_eq!(read_theme(None).reported("appearance-of-other-theme"), 1);
     let inside = read("", &(property("x", &color("1 0 0", &["p"])) + &property("y", &color("0 1 0", &["p"]))), &ReadOptions::default());
     assert_eq!(diffuse(&inside), RED);
     assert_eq!(
@@ -154,10 +154,10 @@ fn colours_and_transparency_are_read() {
     let opaque = color("1 0 0", &["other"]);
     let clear = "<X3DMaterial><transparency>1</transparency><target>#p</target></X3DMaterial>";
     let invisible = read_with_defaults(&member("a", &format!("{opaque}|{clear}")), "");
-    assert_eq!((invisible.count(), invisible.skipped("transparent")), (0, 1));
-    assert_eq!(invisible.warned("fully transparent surfaces are not drawn"), 1);
+    assert_eq!((invisible.count(), invisible.reported("polygon-transparent")), (0, 1));
+    assert_eq!(invisible.reported("transparent-surfaces-not-drawn"), 1);
     let back = with("<diffuseColor>1 0 0</diffuseColor><isFront>false</isFront>");
-    assert_eq!((diffuse(&back), back.warned("back sides")), (RED, 1), "a surface without a front has the appearance of its back");
+    assert_eq!((diffuse(&back), back.reported("appearance-of-back-side")), (RED, 1), "a surface without a front has the appearance of its back");
     let both = "<X3DMaterial><diffuseColor>0 0 1</diffuseColor><isFront>false</isFront><target>#p</target></X3DMaterial>|".to_owned()
         + &color("1 0 0", &["p"]);
     assert_eq!(diffuse(&read_with_defaults(&member("a", &both), "")), RED);
@@ -199,7 +199,7 @@ fn rings_without_valid_texture_coordinates_fall_back_to_the_colour() {
         let document = read_with_defaults(&member("a", &(texture("", "p", coordinates) + "|" + &color("1 0 0", &["p"]))), "");
         assert_eq!(document.material_of(0).texture.is_some(), textured, "{coordinates}: {:?}", document.report);
         assert!(textured || diffuse(&document) == RED);
-        assert!(textured || document.warned("texture") > 0);
+        assert!(textured || document.reported("texture") > 0);
     }
     let without_number_sign = texture("", "p", UVS).replace("'#p'", "'p'").replace("'#r'", "'r'");
     assert!(read_with_defaults(&member("a", &without_number_sign), "").material_of(0).texture.is_some());
@@ -209,7 +209,7 @@ fn rings_without_valid_texture_coordinates_fall_back_to_the_colour() {
 fn missing_images_fall_back_to_the_colour() {
     let missing = texture("", "p", UVS).replace("t.png", "nowhere.png");
     let document = read_with_defaults(&member("a", &(missing + "|" + &color("1 0 0", &["p"]))), "");
-    assert_eq!((diffuse(&document), document.warned("image: file not found")), (RED, 1));
+    assert_eq!((diffuse(&document), document.reported("image-file-not-found")), (RED, 1));
 }
 
 #[test]
@@ -241,7 +241,7 @@ fn georeferenced_textures_use_reference_point_or_world_file() {
     }
     let unplaced = read_with_defaults(&member("a", &georeferenced("").replace("u.png", "t.png")), "");
     assert!(unplaced.material_of(0).texture.is_none());
-    assert_eq!(unplaced.warned("without reference point"), 1);
+    assert_eq!(unplaced.reported("georeferenced-texture-without-place"), 1);
 }
 
 #[test]
@@ -261,7 +261,7 @@ fn a_reference_point_in_another_system_is_used_only_where_the_places_agree() {
     ] {
         let document = texture(name, at);
         assert_eq!((document.material_of(0).texture.is_some(), document.count()), (used, 2), "{name} {at}");
-        assert_eq!(document.warned("georeferenced texture in another coordinate system"), u64::from(!used), "{name} {at}");
+        assert_eq!(document.reported("georeferenced-texture-in"), u64::from(!used), "{name} {at}");
     }
 }
 
@@ -282,16 +282,16 @@ fn a_texture_in_another_system_is_transformed_to_that_of_the_surface() {
     };
     let exact = read("EPSG:31468", 0.0);
     assert_eq!(exact.triangles()[0].uvs, Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]));
-    assert!(exact.report.warnings.is_empty(), "{:?}", exact.report.warnings);
+    assert!(exact.report.findings.is_empty(), "{:?}", exact.report.findings);
     let nearly = read("EPSG:31468", 0.01).triangles()[0].uvs.expect("textured");
     assert!(nearly.as_flattened().iter().zip([0.0, 0.0, 1.0, 0.0, 1.0, 1.0]).all(|(got, expected)| (got - expected).abs() < 0.1), "{nearly:?}");
     for bend in [1.0, f64::NAN] {
         let bent = read("EPSG:31468", bend);
         assert!(bent.material_of(0).texture.is_none(), "{bend}");
-        assert_eq!(bent.warned("georeferenced texture in another coordinate system that no affine map"), 1, "{bend}");
+        assert_eq!(bent.reported("georeferenced-texture-inexact"), 1, "{bend}");
     }
     let unknown = read("EPSG:9999", 0.0);
-    assert_eq!((unknown.material_of(0).texture.is_some(), unknown.warned("than the surface, not used") > 0), (false, true));
+    assert_eq!((unknown.material_of(0).texture.is_some(), unknown.reported("georeferenced-texture-in-other-crs") > 0), (false, true));
 }
 
 #[test]
@@ -335,7 +335,7 @@ fn a_theme_that_the_document_does_not_have_is_named_with_those_that_it_has() {
     let themes = member("summer", &color("1 0 0", &["p"])) + &member("winter", &color("0 1 0", &["p"]));
     let said = |theme: &str, outside: &str| {
         let document = read(outside, "", &of_format(json!({"theme": theme})));
-        document.report.warnings.into_iter().find(|w| w.reason == "requested appearance theme is not in the file").map(|w| w.example)
+        document.report.findings.into_iter().find(|w| w.message.reason.code() == "theme-not-in-file").map(|w| w.example)
     };
     assert_eq!(said("autumn", &themes).as_deref(), Some("autumn; the file has summer, winter"));
     assert_eq!((said("winter", &themes), said("autumn", "")), (None, None), "a document without themes has nothing to choose");

@@ -37,14 +37,14 @@ fn positions_are_read_in_every_notation() {
     ] {
         let document = read_text(&building(&at_lod(2, &ring_of(&inner))));
         assert_eq!((document.count(), document.area()), (2, 4.0), "{case}: {:?}", document.report);
-        assert!(document.report.skipped.is_empty(), "{case}");
+        assert!(document.report.findings.is_empty(), "{case}");
     }
 }
 
 #[test]
 fn open_rings_are_closed_with_a_warning() {
     let document = read_text(&building(&at_lod(2, &polygon("p", "0 0 0 2 0 0 2 2 0 0 2 0"))));
-    assert_eq!((document.area(), document.warned("not closed")), (4.0, 1));
+    assert_eq!((document.area(), document.reported("ring-not-closed")), (4.0, 1));
 }
 
 #[test]
@@ -59,7 +59,7 @@ fn holes_are_cut_out() {
         assert!((read_text(&with(&holes)).area() - area).abs() < 1e-9, "{area}");
     }
     let document = read_text(&with(&(hole("1 0 1 2 0 2 1 0 1") + &one)));
-    assert_eq!((document.area(), document.skipped("fewer than 3")), (94.0, 1), "a broken hole is skipped, the others stay");
+    assert_eq!((document.area(), document.reported("ring-with-too-few-points")), (94.0, 1), "a broken hole is skipped, the others stay");
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn every_surface_and_solid_type_is_converted_once() {
     ] {
         let document = read_text(&building(&format!("<bldg:lod2Geometry>{geometry}</bldg:lod2Geometry>")));
         assert_eq!(document.area(), 8.0, "{case}: {:?}", document.report);
-        assert!(document.report.skipped.is_empty(), "{case}");
+        assert!(document.report.findings.is_empty(), "{case}");
     }
 }
 
@@ -275,7 +275,7 @@ fn polygons_shared_between_objects_are_converted_once() {
     let link = "<bldg:lod2MultiSurface><gml:MultiSurface><gml:surfaceMember xlink:href='#wall'/></gml:MultiSurface></bldg:lod2MultiSurface>";
     for text in [owner(&at_lod(2, &square("wall", 1))) + &other(link), other(link) + &owner(&at_lod(2, &square("wall", 1)))] {
         let document = read_text(&model(&text));
-        assert_eq!((document.area(), document.warned("unresolved reference")), (4.0, 0));
+        assert_eq!((document.area(), document.reported("reference-unresolved")), (4.0, 0));
         assert_eq!(document.objects[document.triangles()[0].object as usize].name, "b1", "the owner converts it");
     }
     // The owner does not convert it, because it has a finer level of detail.

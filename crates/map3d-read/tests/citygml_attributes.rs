@@ -37,7 +37,7 @@ fn attributes_of_extensions_are_named_after_their_path() {
             "plain/a": "1", "plain/b/c": "x",
         })
     );
-    assert_eq!(document.warned("unknown element"), 0, "nothing is drawn in them");
+    assert_eq!(document.reported("element-unknown"), 0, "nothing is drawn in them");
 }
 
 #[test]
@@ -68,7 +68,7 @@ fn geometry_and_features_in_an_extension_are_drawn_and_its_attributes_read() {
     let document = read_text(&building(&body));
     assert_eq!(document.area(), 8.0);
     assert_eq!(attributes(&document), json!({"facade/material": "brick"}), "attributes of surfaces are not kept");
-    assert_eq!(document.warned("unknown element"), 1);
+    assert_eq!(document.reported("element-unknown"), 1);
 }
 
 fn dictionary(definitions: &str) -> String {
@@ -130,7 +130,7 @@ fn code_lists_outside_the_folder_or_broken_leave_the_codes() {
     let values = attributes(&document);
     assert!((0..spaces.len()).all(|k| values[format!("p{k}")] == "1"), "{values}");
     assert!(!values.to_string().contains("secret"), "{values}");
-    assert_eq!(document.warned("code list not read"), 7, "one for each file, none for other names: {:?}", document.report.warnings);
+    assert_eq!(document.reported("code-list-not-read"), 7, "one for each file, none for other names: {:?}", document.report.findings);
 }
 
 #[test]

@@ -8,21 +8,21 @@ use serde_json::json;
 #[test]
 fn broken_polygons_are_skipped_and_counted() {
     for (case, points, reason) in [
-        ("no points", "", "fewer than 3"),
-        ("one point", "0 0 0", "fewer than 3"),
-        ("two points", "0 0 0 1 1 1 0 0 0", "fewer than 3"),
-        ("one point repeated", "1 1 1 1 1 1 1 1 1 1 1 1", "fewer than 3"),
-        ("on a line", "0 0 0 1 1 1 2 2 2 0 0 0", "without area"),
-        ("words", "0 0 a 1 1 1 2 2 2", "unreadable"),
-        ("numbers left over", "0 0 0 1 1 1 2 2", "unreadable"),
-        ("not a number", "0 0 0 nan 1 1 2 2 0 0 0 0", "not a finite"),
-        ("infinite", "0 0 0 1e999 1 1 2 2 0 0 0 0", "not a finite"),
-        ("commas", "0,0,0 1,1,1 2,2,0", "unreadable"),
+        ("no points", "", "ring-with-too-few-points"),
+        ("one point", "0 0 0", "ring-with-too-few-points"),
+        ("two points", "0 0 0 1 1 1 0 0 0", "ring-with-too-few-points"),
+        ("one point repeated", "1 1 1 1 1 1 1 1 1 1 1 1", "ring-with-too-few-points"),
+        ("on a line", "0 0 0 1 1 1 2 2 2 0 0 0", "polygon-without-area"),
+        ("words", "0 0 a 1 1 1 2 2 2", "polygon-coordinates-unreadable"),
+        ("numbers left over", "0 0 0 1 1 1 2 2", "polygon-coordinates-unreadable"),
+        ("not a number", "0 0 0 nan 1 1 2 2 0 0 0 0", "coordinate-not-finite"),
+        ("infinite", "0 0 0 1e999 1 1 2 2 0 0 0 0", "coordinate-not-finite"),
+        ("commas", "0,0,0 1,1,1 2,2,0", "polygon-coordinates-unreadable"),
     ] {
         let members = member(&polygon("bad", points)) + &member(&square("good", 1));
         let document = read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&members))));
         assert_eq!((document.count(), document.area()), (2, 4.0), "{case}");
-        assert_eq!(document.skipped(reason), 1, "{case}: {:?}", document.report);
+        assert_eq!(document.reported(reason), 1, "{case}: {:?}", document.report);
     }
 }
 
@@ -30,7 +30,7 @@ fn broken_polygons_are_skipped_and_counted() {
 fn first_fault_is_an_error_with_strict() {
     let strict = ReadOptions { strict: true, ..ReadOptions::default() };
     let text = building(&at_lod(2, &polygon("p", "0 0 0 1 1 1 0 0 0")));
-    assert!(is_format_error(try_text(&text, &strict), "fewer than 3"));
+    assert!(is_format_error(try_text(&text, &strict), "rings with fewer than 3 points: 1. Example: b1"));
     assert!(try_text(&building(&at_lod(2, &square("p", 1))), &strict).is_ok());
 }
 
@@ -42,8 +42,8 @@ fn unresolved_and_external_references_are_reported() {
             at_lod(2, &square("a", 1))
         ))
     };
-    assert_eq!(read_text(&body("#nothing")).warned("unresolved reference"), 1);
-    assert_eq!(read_text(&body("other.gml#a")).warned("into another file: file not found"), 1);
+    assert_eq!(read_text(&body("#nothing")).reported("reference-unresolved"), 1);
+    assert_eq!(read_text(&body("other.gml#a")).reported("other-file-not-found"), 1);
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn cycles_of_references_are_skipped_and_counted() {
     for (case, inner) in [("itself", member(&itself)), ("two", format!("<gml:surfaceMembers>{two}</gml:surfaceMembers>"))] {
         let document = read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&inner))));
         assert_eq!(document.area(), 4.0, "{case}");
-        assert!(document.skipped("refers to itself") > 0, "{case}");
+        assert!(document.reported("geometry-refers-to-itself") > 0, "{case}");
     }
 }
 
@@ -91,7 +91,7 @@ fn objects_before_malformed_xml_are_read() {
     for text in [whole[..cut].to_owned(), format!("{}wrong{}", &whole[..cut], &whole[cut + 7..]), format!("{}<{}", &whole[..cut], &whole[cut..])] {
         let document = read_text(&text);
         assert_eq!((document.objects.len(), document.count()), (2, 4));
-        assert_eq!(document.warned("document broken"), 1, "{:?}", document.report);
+        assert_eq!(document.reported("document-broken"), 1, "{:?}", document.report);
         assert!(is_format_error(try_text(&text, &strict), "byte"));
     }
 }
@@ -170,12 +170,12 @@ fn complete_polygons_before_the_end_of_a_cut_document_are_read() {
     for (broken, what) in [(text[..cut].to_owned(), "the document ends inside"), (wrong, "gml:wrong")] {
         let document = read_text(&broken);
         assert_eq!((document.objects.len(), document.count(), document.area()), (1, 40, 80.0));
-        let warning = document.report.warnings.iter().find(|w| w.reason == "document broken").expect("a warning");
+        let warning = document.report.findings.iter().find(|w| w.message.reason.code() == "document-broken").expect("a warning");
         let line = broken[..cut].matches('\n').count() + 1;
         assert!(warning.example.contains(&format!(", line {line} (")) && warning.example.contains(what), "{}", warning.example);
         assert!(warning.example.ends_with("; what comes before is kept"), "{}", warning.example);
     }
-    let exact = read_text(&text[..cut]).report.warnings[0].example.clone();
+    let exact = read_text(&text[..cut]).report.findings[0].example.clone();
     assert!(exact.starts_with(&format!("at byte {cut}, line")), "{exact}");
 }
 
@@ -191,7 +191,7 @@ fn colours_before_the_end_of_a_cut_document_are_used() {
     for cut in [text.len(), text.len() - 20] {
         let document = read_text(&text[..cut]);
         assert_eq!((document.count(), document.material_of(0).diffuse), (2, [1.0, 0.0, 0.0, 1.0]));
-        assert_eq!(document.warned("document broken"), 1);
+        assert_eq!(document.reported("document-broken"), 1);
     }
 }
 
@@ -204,15 +204,15 @@ fn faults_of_the_encoding_are_reported() {
     let at = text.find('ü').expect("the letter");
     for (bytes, reason, example) in [
         (text.clone().into_bytes(), "", String::new()),
-        (latin, "not UTF-8 as declared; other bytes read as Windows-1252", format!("byte {at}")),
-        (zeros, "zero bytes left out", format!("byte {}", at + "ühle am".len())),
-        (unknown, "unknown encoding, read as UTF-8", "KLINGON".to_owned()),
+        (latin, "not-utf-8-as-declared", format!("byte {at}")),
+        (zeros, "zero-bytes-left-out", format!("byte {}", at + "ühle am".len())),
+        (unknown, "encoding-unknown", "KLINGON".to_owned()),
     ] {
         let folder = Folder::new("encodings");
         let path = folder.put("a.gml", bytes);
         let document = read_with(&path, &CITYGML, &ReadOptions::default()).expect("readable");
         assert_eq!(document.objects[0].attributes["name"], json!("Mühle am Bach"), "{reason}");
-        let found: Vec<(&str, &str)> = document.report.warnings.iter().map(|w| (w.reason.as_str(), w.example.as_str())).collect();
+        let found: Vec<(&str, &str)> = document.report.findings.iter().map(|w| (w.message.reason.code(), w.example.as_str())).collect();
         let expected: Vec<(&str, &str)> = if reason.is_empty() { vec![] } else { vec![(reason, example.as_str())] };
         assert_eq!(found, expected);
         let strict = ReadOptions { strict: true, ..ReadOptions::default() };

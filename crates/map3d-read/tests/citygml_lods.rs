@@ -108,11 +108,11 @@ fn interiors_are_counted_by_polygon_and_drawn_on_request() {
     );
     let text = building(&(at_lod(4, &half("wall", 1)) + &room + &inner));
     let document = read_text(&text);
-    assert_eq!((document.area(), document.skipped("polygon of an interior")), (0.5, 4));
-    let said = document.report.warnings.iter().find(|w| w.reason == "polygons of interiors are not drawn").map(|w| w.example.as_str());
+    assert_eq!((document.area(), document.reported("polygon-of-interior")), (0.5, 4));
+    let said = document.report.findings.iter().find(|w| w.message.reason.code() == "interiors-not-drawn").map(|w| w.example.as_str());
     assert_eq!(said, Some("4; --interiors draws them"));
     let document = with_interiors(&text);
-    assert_eq!((document.area(), document.skipped("interior"), document.warned("interior")), (16.5, 0, 0));
+    assert_eq!((document.area(), document.reported("polygon-of-interior"), document.reported("interiors")), (16.5, 0, 0));
     assert_eq!(with_interiors(&building(&at_lod(4, &square("w", 1)))).area(), 4.0);
     assert!(document.triangles().iter().all(|t| t.object == 0), "rooms belong to their building");
 }
@@ -121,7 +121,7 @@ fn interiors_are_counted_by_polygon_and_drawn_on_request() {
 fn polygons_that_the_outside_has_too_are_no_interiors() {
     let room = "<bldg:interiorRoom><bldg:Room><bldg:lod4MultiSurface><gml:MultiSurface><gml:surfaceMember xlink:href='#w'/></gml:MultiSurface></bldg:lod4MultiSurface></bldg:Room></bldg:interiorRoom>";
     let document = read_text(&building(&(at_lod(4, &square("w", 1)) + room)));
-    assert_eq!((document.area(), document.skipped("interior")), (4.0, 0));
+    assert_eq!((document.area(), document.reported("polygon-of-interior")), (4.0, 0));
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn interiors_of_version_3_are_known() {
     for room in &rooms {
         let text = building(&(format!("<core:lod2MultiSurface>{}</core:lod2MultiSurface>", multi_surface(&member(&half("wall", 1)))) + room));
         let document = read_text(&text);
-        assert_eq!((document.area(), document.skipped("polygon of an interior")), (0.5, 1), "{room}");
+        assert_eq!((document.area(), document.reported("polygon-of-interior")), (0.5, 1), "{room}");
         assert_eq!(with_interiors(&text).area(), 4.5, "{room}");
     }
     let outside = rooms[2].replace("inside", "bothInsideAndOutside");
@@ -165,7 +165,7 @@ fn a_document_with_nothing_at_the_requested_level_says_what_it_has() {
     let text = building(&(at_lod(1, &square("a", 0)) + &at_lod(3, &square("b", 1))));
     for (lod, expected) in [("2", Some("2; the file has 1, 3")), ("1", None), ("3", None)] {
         let document = try_text(&text, &of_format(json!({"lod": lod}))).expect("readable");
-        let said = document.report.warnings.iter().find(|w| w.reason == "nothing at the requested level of detail").map(|w| w.example.as_str());
+        let said = document.report.findings.iter().find(|w| w.message.reason.code() == "nothing-at-lod").map(|w| w.example.as_str());
         assert_eq!((said, document.count()), (expected, if expected.is_some() { 0 } else { 2 }), "{lod}");
     }
 }

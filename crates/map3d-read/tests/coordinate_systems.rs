@@ -36,7 +36,7 @@ fn geometry_has_the_system_of_the_nearest_element_that_names_one() {
         let document = read_text(&model(&member(&square(2, 0, on))));
         assert_eq!(systems(&document), [("EPSG:31467", 0.0)], "{on:?}");
         assert_eq!(document.srs_name.as_deref(), Some("EPSG:25832+5783"), "the document's is the first");
-        assert!(document.report.skipped.is_empty());
+        assert!(document.report.findings.is_empty());
     }
     assert_eq!(systems(&read_text(&model(&member(&square(2, 0, [r#"srsName=" ""#, "", "", ""]))))), [("EPSG:25832+5783", 0.0)]);
 }
@@ -85,13 +85,13 @@ fn batches_of_alternating_systems_do_not_become_small() {
 fn polygons_in_two_systems_are_skipped() {
     let hole = r#"<gml:interior><gml:LinearRing srsName="EPSG:31467"><gml:posList>1 0 0 1 1 0 2 1 0 1 0 0</gml:posList></gml:LinearRing></gml:interior></gml:Polygon>"#;
     let document = read_text(&model(&member(&square(2, 0, [""; 4]).replace("</gml:Polygon>", hole))));
-    assert_eq!((document.count(), document.skipped("polygon in more than one coordinate system")), (0, 1));
+    assert_eq!((document.count(), document.reported("polygon-in-several-crs")), (0, 1));
     let points = ["0 0 0", "2 0 0", "2 2 0", "0 0 0"]
         .map(|p| format!("<gml:pointProperty><gml:Point srsName='EPSG:31467'><gml:pos>{p}</gml:pos></gml:Point></gml:pointProperty>"));
     let ring = format!("<gml:Polygon><gml:exterior><gml:LinearRing>{}</gml:LinearRing></gml:exterior></gml:Polygon>", points.concat());
     let of = |ring: &str| read_text(&model(&member(&format!("<bldg:lod2MultiSurface>{ring}</bldg:lod2MultiSurface>"))));
     assert_eq!(systems(&of(&ring)), [("EPSG:31467", 0.0)], "points name it");
-    assert_eq!(of(&ring.replacen("EPSG:31467", "EPSG:31468", 1)).skipped("more than one"), 1);
+    assert_eq!(of(&ring.replacen("EPSG:31467", "EPSG:31468", 1)).reported("polygon-in-several-crs"), 1);
 }
 
 #[test]
@@ -99,7 +99,7 @@ fn more_systems_than_the_limit_are_skipped() {
     let members: String = (0..40).map(|k| member(&square(2, k, [&format!(r#"srsName="EPSG:{}""#, 2000 + k), "", "", ""]))).collect();
     let document = read_text(&model(&members));
     assert_eq!((document.crs_names.len(), document.count()), (32, 62));
-    assert_eq!(document.skipped("polygon in one of too many coordinate systems"), 9);
+    assert_eq!(document.reported("polygon-crs-too-many"), 9);
 }
 
 #[test]

@@ -93,7 +93,7 @@ fn images_over_a_limit_are_skipped() {
         let document = read_with_image(&image, &options);
         assert_eq!(document.textures.len() == 1, is_used, "{side} {pixels}");
         assert_eq!(document.count(), 1);
-        assert_eq!(document.warned("limit max_image"), u64::from(!is_used));
+        assert_eq!(document.reported("image-"), u64::from(!is_used));
     }
 }
 
@@ -108,7 +108,7 @@ fn invalid_images_are_skipped() {
     for bytes in [&b""[..], b"text", &image[..10], &huge_header, b"GIF89a", b"\xFF\xD8\xFF"] {
         let document = read_with_image(bytes, &ReadOptions::default());
         assert_eq!((document.textures.len(), document.count()), (0, 1), "{bytes:?}");
-        assert_eq!(document.warned("image:"), 1);
+        assert_eq!(document.reported("image-"), 1);
     }
 }
 

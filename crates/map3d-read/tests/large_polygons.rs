@@ -208,5 +208,5 @@ fn a_hopeless_polygon_does_not_cost_the_document() {
     let members = member(&polygon("hopeless", &format!("{} {}", ring.join(" "), ring[0]))) + &member(&square("good", 1));
     let document = read_text(&building(&format!("<bldg:lod2MultiSurface>{}</bldg:lod2MultiSurface>", multi_surface(&members))));
     assert_eq!((document.count(), document.area()), (2, 4.0));
-    assert_eq!(document.skipped("polygon with too many vertices to triangulate"), 1, "{:?}", document.report);
+    assert_eq!(document.reported("polygon-with-too-many-vertices"), 1, "{:?}", document.report);
 }

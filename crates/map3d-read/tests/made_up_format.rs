@@ -37,7 +37,8 @@ impl SignReader {
     fn open(path: &Path, options: &ReadOptions) -> Result<Self> {
         let SignOptions { width } = options.parse_of_format()?;
         let bytes = fs::read(path).map_err(|e| Error::storage(path, e))?;
-        let image = DocumentImage::inspect(ImageSource::Bytes(bytes["sign\n".len()..].into()), options).map_err(|e| Error::format(path, e))?;
+        let image =
+            DocumentImage::inspect(ImageSource::Bytes(bytes["sign\n".len()..].into()), options).map_err(|e| Error::format(path, e.to_string()))?;
         let batch = Batch {
             positions: vec![[0.0; 3], [width, 0.0, 0.0], [0.0, 0.0, 1.0]],
             triangles: vec![[0, 1, 2]],
@@ -124,8 +125,8 @@ fn images_inside_documents_have_the_limits_of_image_files() {
     let folder = Folder::new("sign");
     let path = put_sign(&folder, &encode_png(4, 2, [10, 20, 30, 40]));
     let limited = ReadOptions { max_image_px: 7, ..ReadOptions::default() };
-    assert!(is_format_error(open(&path, SIGN, &limited), "pixels over the limit max_image_px = 7"));
-    assert!(is_format_error(open(&put_sign(&folder, b"no image"), SIGN, &ReadOptions::default()), "unknown format"));
+    assert!(is_format_error(open(&path, SIGN, &limited), "Textures of more than 7 pixels"));
+    assert!(is_format_error(open(&put_sign(&folder, b"no image"), SIGN, &ReadOptions::default()), "Textures in a format that map3d does not read"));
 }
 
 #[test]

@@ -31,29 +31,29 @@ fn faces_are_read_in_every_notation() {
     ] {
         let document = read_text("notation", format!("{SQUARE}{faces}"));
         assert_eq!((document.count(), document.area()), (triangles, area), "{case}");
-        assert!(document.report.skipped.is_empty(), "{case}: {:?}", document.report);
+        assert!(document.report.findings.is_empty(), "{case}: {:?}", document.report);
     }
 }
 
 #[test]
 fn degenerate_faces_are_skipped_and_counted() {
     for (case, faces, reason) in [
-        ("one vertex", "f 1\n", "fewer than 3"),
-        ("two vertices", "f 1 2\n", "fewer than 3"),
-        ("no vertices", "f\n", "fewer than 3"),
-        ("one vertex three times", "f 1 1 1\n", "fewer than 3"),
-        ("on a line", "v 4 0 0\nf 1 2 5\n", "without area"),
-        ("beyond the end", "f 1 2 9\n", "out of range"),
-        ("zero", "f 0 1 2\n", "out of range"),
-        ("before the first", "f -9 1 2\n", "out of range"),
-        ("words", "f a b c\n", "unreadable face"),
-        ("not a number", "v nan 0 0\nf 1 2 5\n", "not a finite"),
-        ("infinite", "v inf 0 0\nf 1 2 5\n", "not a finite"),
-        ("short vertex", "v 1 2\nf 1 2 5\n", "not a finite"),
+        ("one vertex", "f 1\n", "face-with-too-few-vertices"),
+        ("two vertices", "f 1 2\n", "face-with-too-few-vertices"),
+        ("no vertices", "f\n", "face-with-too-few-vertices"),
+        ("one vertex three times", "f 1 1 1\n", "face-with-too-few-vertices"),
+        ("on a line", "v 4 0 0\nf 1 2 5\n", "polygon-without-area"),
+        ("beyond the end", "f 1 2 9\n", "index-out-of-range"),
+        ("zero", "f 0 1 2\n", "index-out-of-range"),
+        ("before the first", "f -9 1 2\n", "index-out-of-range"),
+        ("words", "f a b c\n", "face-unreadable"),
+        ("not a number", "v nan 0 0\nf 1 2 5\n", "coordinate-not-finite"),
+        ("infinite", "v inf 0 0\nf 1 2 5\n", "coordinate-not-finite"),
+        ("short vertex", "v 1 2\nf 1 2 5\n", "coordinate-not-finite"),
     ] {
         let document = read_text("degenerate", format!("{SQUARE}{faces}f 1 2 3\n"));
         assert_eq!(document.count(), 1, "{case}");
-        assert_eq!(document.skipped(reason), 1, "{case}: {:?}", document.report);
+        assert_eq!(document.reported(reason), 1, "{case}: {:?}", document.report);
     }
 }
 
@@ -118,7 +118,7 @@ fn split_makes_one_object_per_file_or_group() {
 fn faces_may_precede_their_vertices() {
     let document = read_text("forward", format!("f 1 2 3\nf 1 2 7\n{SQUARE}f 1 3 4\n"));
     assert_eq!((document.count(), document.area()), (2, 4.0));
-    assert_eq!(document.skipped("out of range"), 1);
+    assert_eq!(document.reported("index-out-of-range"), 1);
 }
 
 #[test]
@@ -183,7 +183,7 @@ fn materials_are_read_from_the_library() {
 #[test]
 fn fully_transparent_faces_are_skipped() {
     let document = read_with_material("invisible", "newmtl m\nd 0\nnewmtl other\nd 1\n", "f 1 2 3\n");
-    assert_eq!((document.count(), document.skipped("transparent")), (0, 1));
+    assert_eq!((document.count(), document.reported("face-transparent")), (0, 1));
 }
 
 #[test]
@@ -233,9 +233,9 @@ fn missing_files_are_reported_and_the_geometry_is_read() {
     let path = folder.put("a.obj", format!("mtllib nowhere.mtl b.mtl\n{SQUARE}vt 0 0\nusemtl m\nf 1/1 2/1 3/1\nusemtl unknown\nf 1/1 3/1 4/1\n"));
     let document = read_with(&path, &OBJ, &ReadOptions::default()).expect("readable");
     assert_eq!(document.count(), 2);
-    assert_eq!(document.warned("material library: file not found"), 1);
-    assert_eq!(document.warned("image: file not found"), 1);
-    assert_eq!(document.warned("material not defined"), 1);
+    assert_eq!(document.reported("material-library-not-found"), 1);
+    assert_eq!(document.reported("image-file-not-found"), 1);
+    assert_eq!(document.reported("material-not-defined"), 1);
     assert_eq!(document.material_of(0).diffuse, [1.0, 0.0, 0.0, 1.0]);
 }
 
@@ -266,7 +266,7 @@ fn vertex_colours_become_face_colours() {
 #[test]
 fn points_and_lines_are_counted() {
     let document = read_text("lines", format!("{SQUARE}p 1\nl 1 2 3\nf 1 2 3\n"));
-    assert_eq!((document.count(), document.skipped("points and lines")), (1, 2));
+    assert_eq!((document.count(), document.reported("points-and-lines")), (1, 2));
 }
 
 #[test]
@@ -305,6 +305,6 @@ fn limits_are_inclusive() {
         let options = ReadOptions { max_ring_vertices: limit, ..ReadOptions::default() };
         let document = read_with(&path, &OBJ, &options).expect("readable");
         assert_eq!(document.count(), triangles);
-        assert_eq!(document.skipped("max_ring_vertices"), u64::from(triangles == 1));
+        assert_eq!(document.reported("face-over-limit"), u64::from(triangles == 1));
     }
 }

@@ -51,15 +51,15 @@ fn prototypes_without_id_are_not_shared() {
 #[test]
 fn invalid_implicit_geometry_is_skipped_and_counted() {
     for (case, member, reason) in [
-        ("no prototype", tree("a", MATRIX, "", "0 0 0"), "without a prototype"),
-        ("unresolved prototype", tree("a", MATRIX, SAME, "0 0 0"), "without a prototype"),
-        ("broken matrix", tree("a", "<transformationMatrix>1 2 3</transformationMatrix>", SHAPE, "0 0 0"), "invalid transformation matrix"),
-        ("no reference point", tree("a", MATRIX, SHAPE, ""), "without a reference point"),
-        ("not finite", tree("a", MATRIX, SHAPE, "nan 0 0"), "invalid transformation matrix"),
+        ("no prototype", tree("a", MATRIX, "", "0 0 0"), "implicit-geometry-without-prototype"),
+        ("unresolved prototype", tree("a", MATRIX, SAME, "0 0 0"), "implicit-geometry-without-prototype"),
+        ("broken matrix", tree("a", "<transformationMatrix>1 2 3</transformationMatrix>", SHAPE, "0 0 0"), "implicit-geometry-matrix-invalid"),
+        ("no reference point", tree("a", MATRIX, SHAPE, ""), "implicit-geometry-without-reference-point"),
+        ("not finite", tree("a", MATRIX, SHAPE, "nan 0 0"), "implicit-geometry-matrix-invalid"),
     ] {
         let document = read_with_defaults(&member);
         assert_eq!((document.instances.len(), document.objects.len()), (0, 1), "{case}");
-        assert_eq!(document.skipped(reason), 1, "{case}: {:?}", document.report);
+        assert_eq!(document.reported(reason), 1, "{case}: {:?}", document.report);
     }
 }
 
@@ -69,12 +69,15 @@ fn library_objects_are_read_from_obj_files_in_the_folder() {
     let document = read_with_defaults(&(tree("a", "", &library("lamp.obj"), "1 2 3") + &tree("b", "", &library("lamp.obj"), "4 5 6")));
     assert_eq!((document.count(), document.instances.len()), (1, 2));
     assert_eq!(document.material_of(0).diffuse, [1.0, 1.0, 0.0, 1.0]);
-    for (name, reason) in
-        [("../lamp.obj", "outside"), ("http://host.example/lamp.obj", "URL"), ("none.obj", "not found"), ("lamp.wrl", "unsupported format")]
-    {
+    for (name, reason) in [
+        ("../lamp.obj", "library-object-outside-folder"),
+        ("http://host.example/lamp.obj", "library-object-url-not-fetched"),
+        ("none.obj", "library-object-not-found"),
+        ("lamp.wrl", "library-object-format-not-read"),
+    ] {
         let document = read_with_defaults(&tree("a", "", &library(name), "1 2 3"));
         assert_eq!(document.instances.len(), 0, "{name}");
-        assert_eq!(document.warned(reason), 1, "{name}: {:?}", document.report);
+        assert_eq!(document.reported(reason), 1, "{name}: {:?}", document.report);
     }
 }
 

@@ -71,12 +71,12 @@ fn ingolstadt_has_the_expected_classes_and_textures() {
     let count = |class: &str| parsed.iter().flat_map(|r| &r.objects).filter(|o| o.class == class).count();
     assert_eq!((count("building"), count("building_part")), (54, 1));
     assert!(parsed.iter().all(|r| r.srs_name.as_deref() == Some("EPSG:32632")));
-    assert!(parsed.iter().map(|r| r.warned("image: file not found")).sum::<u64>() > 0, "two images are missing");
+    assert!(parsed.iter().map(|r| r.reported("image-file-not-found")).sum::<u64>() > 0, "two images are missing");
     assert!(parsed.iter().map(|r| r.textures.len()).sum::<usize>() >= 170);
     let textured = parsed.iter().flat_map(|r| r.triangles().into_iter().filter(|t| r.materials[t.material as usize].texture.is_some())).count();
     // The same sum over polygons with a front texture and coordinates for the exterior ring is 35,388.
     assert!((34_000..=35_388).contains(&textured), "{textured}");
-    let crossing: u64 = parsed.iter().map(|r| r.warned("cross")).sum();
+    let crossing: u64 = parsed.iter().map(|r| r.reported("rings-cross")).sum();
     assert!(crossing <= 4, "{crossing}: only a few polygons intersect themselves; all others are covered exactly");
 }
 

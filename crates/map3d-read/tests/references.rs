@@ -72,7 +72,7 @@ fn geometry_of_another_file_is_drawn_with_its_textures_and_its_coordinate_system
     let crs: Vec<_> = document.batches.iter().map(|b| document.crs_names[b.crs as usize].as_deref()).collect();
     assert_eq!(crs, [Some("EPSG:25832"), Some("EPSG:31468")]);
     assert!(document.triangles().iter().all(|t| t.object == 0));
-    assert_eq!(document.report.warnings.len(), 0, "{:?}", document.report.warnings);
+    assert_eq!(document.report.findings.len(), 0, "{:?}", document.report.findings);
 }
 
 #[test]
@@ -89,10 +89,10 @@ fn prototypes_of_another_file_are_placed() {
     folder.put("trees.gml", format!("<Library xmlns:gml='g'><gml:MultiSurface gml:id='oak'>{}</gml:MultiSurface></Library>", square("p", 0)));
     let document = read_in(&folder, "a.gml");
     assert_eq!(document.instances.iter().map(|i| (i.prototype, i.transform[3])).collect::<Vec<_>>(), [(1, 5.0), (1, 7.0)]);
-    assert_eq!((document.count(), document.report.warnings.len()), (2, 0));
+    assert_eq!((document.count(), document.report.findings.len()), (2, 0));
     fs::remove_file(folder.0.join("trees.gml")).expect("remove");
     let without = read_in(&folder, "a.gml");
-    assert_eq!((without.skipped("a prototype"), without.warned("into another file: file not found")), (2, 2));
+    assert_eq!((without.reported("implicit-geometry-without-prototype"), without.reported("other-file-not-found")), (2, 2));
 }
 
 #[test]
@@ -108,10 +108,10 @@ fn appearances_of_another_file_texture_the_surfaces_they_target() {
         let document = read(&a, &options);
         let red = Some("../photos/../images/red.png");
         assert_eq!((0..4).map(|t| texture_of(&document, t)).collect::<Vec<_>>(), [red, red, None, None]);
-        assert_eq!(document.warned("appearance in another file: no surface with this id"), 1);
-        let named = |text: &str| document.report.warnings.iter().any(|w| w.example == text);
-        assert!(named("../tiles/a.gml#nowhere") && named("b.gml#p"), "{:?}", document.report.warnings);
-        assert_eq!(document.report.warnings.len(), 2);
+        assert_eq!(document.reported("appearance-target-not-found"), 1);
+        let named = |text: &str| document.report.findings.iter().any(|w| w.example == text);
+        assert!(named("../tiles/a.gml#nowhere") && named("b.gml#p"), "{:?}", document.report.findings);
+        assert_eq!(document.report.findings.len(), 2);
     }
     let alone = read(&a, &ReadOptions { folder: Some(folder.0.clone()), ..ReadOptions::default() });
     assert_eq!((0..4).filter_map(|t| texture_of(&alone, t)).count(), 0);
@@ -123,8 +123,8 @@ fn a_file_with_appearances_for_another_one_says_so() {
     folder.put("b.gml", model(""));
     folder.put("a.gml", model(&(building("a", &square("p", 0)) + &texture("red.png", "b.gml#p", "#r") + &texture("red.png", "none.gml#p", "#r"))));
     let document = read_in(&folder, "a.gml");
-    assert_eq!(document.warned("appearance for surfaces of another file"), 1);
-    assert_eq!(document.warned("into another file: file not found"), 1);
+    assert_eq!(document.reported("appearance-for-other-file"), 1);
+    assert_eq!(document.reported("other-file-not-found"), 1);
 }
 
 #[test]
@@ -135,20 +135,24 @@ fn references_that_lead_nowhere_are_counted_by_name() {
     folder.put("city/doctype.gml", "<!DOCTYPE a><CityModel/>");
     folder.put("city/b.gml", model(&building("b", &(square("p", 10) + &group("deep", &link("c.gml#x"))))));
     for (href, reason, named) in [
-        ("none.gml#p", "file not found", "none.gml#p"),
-        ("../elsewhere/c.gml#p", "file outside the given folder", "../elsewhere/c.gml#p"),
-        ("https://example.org/c.gml#p", "URL not fetched", "https://example.org/c.gml#p"),
-        ("b.gml#none", "no geometry with this id", "b.gml#none"),
-        ("b.gml#deep", "file not found", "c.gml#x"),
-        ("broken.gml#none", "no geometry with this id", "broken.gml#none"),
-        ("doctype.gml#none", "no geometry with this id", "doctype.gml#none"),
+        ("none.gml#p", "other-file-not-found", "none.gml#p"),
+        ("../elsewhere/c.gml#p", "other-file-outside-folder", "../elsewhere/c.gml#p"),
+        ("https://example.org/c.gml#p", "other-file-url-not-fetched", "https://example.org/c.gml#p"),
+        ("b.gml#none", "other-file-without-geometry", "b.gml#none"),
+        ("b.gml#deep", "other-file-not-found", "c.gml#x"),
+        ("broken.gml#none", "other-file-without-geometry", "broken.gml#none"),
+        ("doctype.gml#none", "other-file-without-geometry", "doctype.gml#none"),
     ] {
         let path = folder.put("city/a.gml", model(&building("a", &(square("p", 0) + &link(href)))));
         let options = ReadOptions { folder: Some(folder.0.join("city")), ..ReadOptions::default() };
         let document = read(&path, &options);
-        assert_eq!((document.count(), document.warned(reason)), (2, 1), "{href}: {:?}", document.report.warnings);
-        assert!(document.report.warnings.iter().any(|w| w.reason.contains(reason) && w.example == named), "{href}: {:?}", document.report.warnings);
-        assert_eq!(document.warned("broken or too large"), u64::from(href.starts_with(['b', 'd']) && !href.starts_with("b.gml")), "{href}");
+        assert_eq!((document.count(), document.reported(reason)), (2, 1), "{href}: {:?}", document.report.findings);
+        assert!(
+            document.report.findings.iter().any(|w| w.message.reason.code() == reason && w.example == named),
+            "{href}: {:?}",
+            document.report.findings
+        );
+        assert_eq!(document.reported("other-file-broken"), u64::from(href.starts_with(['b', 'd']) && !href.starts_with("b.gml")), "{href}");
         let strict = ReadOptions { strict: true, ..options };
         assert!(is_format_error(read_with(&path, &CITYGML, &strict), ""), "{href}");
     }
@@ -161,10 +165,10 @@ fn cycles_of_files_are_refused_for_each_reference() {
     folder.put("b.gml", model(&building("b", &group("y", &(square("p", 10) + &link("a.gml#x") + &link("b.gml#y"))))));
     let document = read_in(&folder, "a.gml");
     assert_eq!(document.count(), 4, "both squares");
-    assert_eq!(document.skipped("refers to itself"), 2);
+    assert_eq!(document.reported("geometry-refers-to-itself"), 2);
     let back = model(&building("b", &(group("y", &link("a.gml#p")) + &square("p", 10))));
     folder.put("b.gml", back);
-    assert_eq!(read_in(&folder, "a.gml").skipped("refers to itself"), 0, "the way back to another surface is no cycle");
+    assert_eq!(read_in(&folder, "a.gml").reported("geometry-refers-to-itself"), 0, "the way back to another surface is no cycle");
 }
 
 #[test]
@@ -176,7 +180,7 @@ fn chains_have_a_limit() {
         }
         folder.put(&format!("{links}.gml"), model(&building("b", &group("x", &square("end", 500)))));
         let document = read_in(&folder, "0.gml");
-        (document.count(), document.warned("chain of more than 16"))
+        (document.count(), document.reported("other-file-chain-too-long"))
     };
     assert_eq!(count(16), (4, 0));
     assert_eq!(count(17), (2, 1));
@@ -189,10 +193,10 @@ fn very_long_references_are_shortened() {
     let long = "x".repeat(1 << 20);
     folder.put("a.gml", model(&building("a", &(square("p", 0) + &link(&format!("b.gml#{long}")) + &link(&format!("{long}.gml#p"))))));
     let document = read_in(&folder, "a.gml");
-    let found: Vec<_> = document.report.warnings.iter().map(|w| (w.reason.as_str(), w.example.len() <= 256)).collect();
+    let found: Vec<_> = document.report.findings.iter().map(|w| (w.message.reason.code(), w.example.len() <= 256)).collect();
     assert_eq!(document.count(), 2);
-    assert!(found.contains(&("reference into another file: no geometry with this id", true)), "{found:?}");
-    assert!(found.iter().any(|(reason, _)| reason.contains("invalid file name")), "{found:?}");
+    assert!(found.contains(&("other-file-without-geometry", true)), "{found:?}");
+    assert!(found.iter().any(|(reason, _)| *reason == "other-file-name-invalid"), "{found:?}");
 }
 
 #[test]
@@ -201,7 +205,7 @@ fn a_reference_to_the_file_itself_by_its_name_is_one_inside_it() {
     folder
         .put("a.gml", model(&(building("a", &link("a.gml#q")) + &building("b", &group("y", &link("./a.gml#q"))) + &building("c", &square("q", 0)))));
     let document = read_in(&folder, "a.gml");
-    assert_eq!((document.count(), document.report.warnings.len()), (2, 0), "{:?}", document.report.warnings);
+    assert_eq!((document.count(), document.report.findings.len()), (2, 0), "{:?}", document.report.findings);
 }
 
 #[test]
@@ -213,6 +217,6 @@ fn a_part_in_another_file_is_counted_and_other_references_are_not() {
     folder.put("walls.gml", model(&building("w", &square("w1", 10))));
     let document = read_in(&folder, "a.gml");
     assert_eq!(document.count(), 2);
-    let counted = document.report.warnings.iter().find(|w| w.reason == "part of an object in another file, not followed").expect("counted");
+    let counted = document.report.findings.iter().find(|w| w.message.reason.code() == "part-in-other-file").expect("counted");
     assert_eq!((counted.count, counted.example.as_str()), (1, "walls.gml#w1"));
 }

@@ -41,7 +41,7 @@ fn heights_in_the_document_are_triangles_at_the_points_of_the_grid() {
     assert_eq!(corners(&text), [[100, 200, 1], [100, 205, 4], [110, 200, 2], [110, 205, 5], [120, 200, 3], [120, 205, 6]]);
     let document = read_text(&text);
     assert_eq!((document.count(), document.objects[0].lod.as_deref()), (4, Some("2")));
-    assert!(document.report.skipped.is_empty() && document.report.warnings.is_empty(), "{:?}", document.report);
+    assert!(document.report.findings.is_empty(), "{:?}", document.report);
     let upwards = |[a, b, c]: [[f64; 3]; 3]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0;
     assert!(document.triangles().iter().all(|t| upwards(t.corners)));
     let down = DOMAIN.replace("0 5</gml:offsetVector>", "0 -5</gml:offsetVector>");
@@ -67,7 +67,7 @@ fn the_sequence_rule_says_how_heights_run_over_the_grid() {
 fn gaps_have_no_triangles_and_are_counted() {
     for gap in ["missing", "-999999", "nan", "inf"] {
         let document = read_text(&relief(DOMAIN, &inline(&format!("{gap} 2 3 4 5 6")), ""));
-        assert_eq!((document.count(), document.skipped("grid points without a height")), (3, 1), "{gap}");
+        assert_eq!((document.count(), document.reported("grid-points-without-height")), (3, 1), "{gap}");
     }
 }
 
@@ -76,7 +76,7 @@ fn an_extent_bounds_the_heights() {
     let ring = "<dem:extent><gml:Polygon><gml:exterior><gml:LinearRing><gml:posList>100 200 0 110 200 0 110 205 0 100 205 0 100 200 0</gml:posList>\
          </gml:LinearRing></gml:exterior></gml:Polygon></dem:extent>";
     let document = read_text(&relief(DOMAIN, &inline("1 2 3 4 5 6"), ring));
-    assert_eq!((document.count(), document.skipped("RasterRelief: triangle outside the extent")), (2, 2));
+    assert_eq!((document.count(), document.reported("relief-triangle-outside-extent")), (2, 2));
     assert!(document.triangles().iter().all(|t| t.corners.iter().all(|p| p[0] <= 110.0)), "the extent itself is not drawn");
 }
 
@@ -85,26 +85,26 @@ fn an_unusable_grid_says_why() {
     let numbers = inline("1 2 3 4 5 6");
     let rule = "<gml:sequenceRule>Boustrophedonic</gml:sequenceRule>";
     for (domain, range, reason) in [
-        (DOMAIN.to_owned(), String::new(), "RasterRelief: grid without heights"),
-        (DOMAIN.to_owned(), inline("1 2 3"), "RasterRelief: number of heights that does not fit the grid"),
-        (DOMAIN.to_owned(), numbers.clone() + rule, "RasterRelief: order of values that map3d does not read"),
-        (DOMAIN.replace("0 5</gml:off", "20 0</gml:off"), numbers.clone(), "RasterRelief: offset vectors that span no area"),
-        (DOMAIN.replace("0 5</gml:off", "0 nan</gml:off"), numbers.clone(), "RasterRelief: offset vectors that span no area"),
-        (DOMAIN.replace("<gml:high>2 1", "<gml:high>2 0"), numbers.clone(), "RasterRelief: grid with fewer than 2 × 2 points"),
-        (DOMAIN.replace("<gml:high>2 1", "<gml:high>1e300 1e300"), numbers.clone(), "RasterRelief: grid with fewer than 2 × 2 points"),
-        (DOMAIN.replace("<gml:pos>100 200", "<gml:pos>100"), numbers.clone(), "RasterRelief: grid without limits, origin or two offset vectors"),
-        (String::new(), numbers.clone(), "RasterRelief: grid without limits, origin or two offset vectors"),
-        (DOMAIN.to_owned(), file("none.tif"), "RasterRelief: file not found"),
-        (DOMAIN.to_owned(), file("../none.tif"), "RasterRelief: file outside the asset's folder not read"),
-        (DOMAIN.to_owned(), file("https://example.org/dem.tif"), "RasterRelief: URL not fetched"),
+        (DOMAIN.to_owned(), String::new(), "relief-grid-without-heights"),
+        (DOMAIN.to_owned(), inline("1 2 3"), "relief-grid-heights-do-not-fit"),
+        (DOMAIN.to_owned(), numbers.clone() + rule, "relief-grid-order-not-read"),
+        (DOMAIN.replace("0 5</gml:off", "20 0</gml:off"), numbers.clone(), "relief-grid-without-area"),
+        (DOMAIN.replace("0 5</gml:off", "0 nan</gml:off"), numbers.clone(), "relief-grid-without-area"),
+        (DOMAIN.replace("<gml:high>2 1", "<gml:high>2 0"), numbers.clone(), "relief-grid-too-small"),
+        (DOMAIN.replace("<gml:high>2 1", "<gml:high>1e300 1e300"), numbers.clone(), "relief-grid-too-small"),
+        (DOMAIN.replace("<gml:pos>100 200", "<gml:pos>100"), numbers.clone(), "relief-grid-incomplete"),
+        (String::new(), numbers.clone(), "relief-grid-incomplete"),
+        (DOMAIN.to_owned(), file("none.tif"), "relief-file-not-found"),
+        (DOMAIN.to_owned(), file("../none.tif"), "relief-file-outside-folder"),
+        (DOMAIN.to_owned(), file("https://example.org/dem.tif"), "relief-url-not-fetched"),
     ] {
         let document = read_text(&relief(&domain, &range, ""));
-        assert_eq!((document.count(), document.skipped(reason)), (0, 1), "{reason}: {:?}", document.report);
+        assert_eq!((document.count(), document.reported(reason)), (0, 1), "{reason}: {:?}", document.report);
     }
     for (max_object_bytes, heights) in [(500, numbers), (1000, inline(&"1 ".repeat(100)))] {
         let limits = ReadOptions { max_object_bytes, ..ReadOptions::default() };
         let document = try_text(&relief(DOMAIN, &heights, ""), &limits).expect("counted");
-        assert_eq!(document.skipped("RasterRelief: too many heights in the document"), 1, "{max_object_bytes}");
+        assert_eq!(document.reported("relief-grid-with-too-many-heights"), 1, "{max_object_bytes}");
     }
 }
 
@@ -123,7 +123,7 @@ fn a_raster_file_is_handed_on_with_its_place() {
     assert_eq!((grid.object.as_str(), grid.columns, grid.rows, grid.crs.as_deref()), ("r", 3, 3, Some("EPSG:25832")));
     assert_eq!((grid.first, grid.column_step, grid.row_step), ([100.0, 205.0], [10.0, 0.0], [0.0, -5.0]));
     assert!(grid.file.ends_with("dem.tif"));
-    assert_eq!(document.report().warnings[0].reason, "file name with different case");
+    assert_eq!(document.report().findings[0].message.reason.code(), "file-name-case-differs");
 }
 
 #[test]

@@ -37,7 +37,7 @@ fn control_points_become_triangles() {
         let document = read_text(&tin(&format!("{empty}{}", control(CORNERS))));
         assert_eq!(document.count(), 2, "{empty}");
         assert_eq!(document.objects[0].lod.as_deref(), Some("2"));
-        assert!(document.report.skipped.is_empty() && document.report.warnings.is_empty(), "{:?}", document.report);
+        assert!(document.report.findings.is_empty(), "{:?}", document.report);
     }
     let positions =
         "<gml:pos>0 0 0</gml:pos><gml:pointProperty><gml:Point><gml:pos>4 0 0</gml:pos></gml:Point></gml:pointProperty><gml:pos>0 4 0</gml:pos>";
@@ -51,7 +51,7 @@ fn a_tin_with_triangles_keeps_them() {
     let patches = format!("<gml:trianglePatches>{triangle}</gml:trianglePatches>");
     let lines = line("breakLines", "0 0 0 5 5 5") + &line("stopLines", "0 0 0 5 5 5");
     let document = read_text(&tin(&format!("{patches}{lines}<gml:maxLength uom='m'>0.1</gml:maxLength>{}", control(CORNERS))));
-    assert_eq!((document.count(), document.skipped("points and lines")), (1, 2));
+    assert_eq!((document.count(), document.reported("points-and-lines")), (1, 2));
     let document = read_text(&relief(&format!("<gml:TriangulatedSurface>{patches}{}</gml:TriangulatedSurface>", control(CORNERS))));
     assert_eq!(document.count(), 1);
 }
@@ -63,33 +63,33 @@ fn break_lines_stop_lines_and_the_longest_side_shape_the_tin() {
     let has_ridge = |text: &str| read_text(text).triangles().iter().all(|t| t.corners.contains(&[0.0; 3]) && t.corners.contains(&[20.0, 20.0, 0.0]));
     assert!(!has_ridge(&tin(&control(kite))) && has_ridge(&tin(&(line("breakLines", "0 0 0 20 20 0") + &control(kite)))));
     let stop = read_text(&tin(&(line("stopLines", "8 4 0 12 9 0") + &control(kite))));
-    assert_eq!((stop.count(), stop.skipped("Tin: triangle at a stop line")), (1, 1), "{:?}", stop.report);
+    assert_eq!((stop.count(), stop.reported("tin-triangle-at-stop-line")), (1, 1), "{:?}", stop.report);
     let far = format!("{CORNERS} 500 5 0");
     for (length, skipped) in [("<gml:maxLength uom='m'>20</gml:maxLength>", 1), ("<gml:maxLength uom='urn:x#km'>0.02</gml:maxLength>", 1), ("", 0)] {
         let document = read_text(&tin(&(length.to_owned() + &control(&far))));
-        assert_eq!(document.skipped("Tin: triangle with a side over maxLength"), skipped, "{length}");
+        assert_eq!(document.reported("tin-triangle-too-long"), skipped, "{length}");
         assert_eq!(document.count() as u64, 3 - skipped, "{length}");
     }
     let document = read_text(&tin(&(control(CORNERS) + "<gml:maxLength uom='m'>long</gml:maxLength>")));
-    assert_eq!((document.count(), document.warned("Tin: maxLength that is not a length")), (2, 1));
+    assert_eq!((document.count(), document.reported("tin-max-length-invalid")), (2, 1));
 }
 
 #[test]
 fn a_broken_tin_is_skipped_and_counted() {
     let crs = "<gml:controlPoint><gml:posList srsName='EPSG:25833'>0 0 0 1 0 0 0 1 0</gml:posList></gml:controlPoint>";
     for (case, body, reason) in [
-        ("nothing", String::new(), "Tin: fewer than 3 control points"),
-        ("no point", control(""), "Tin: fewer than 3 control points"),
-        ("two points", control("0 0 0 1 0 0"), "Tin: fewer than 3 control points"),
-        ("one place", control("1 1 0 1 1 0 1 1 0"), "Tin: fewer than 3 control points"),
-        ("a line", control("0 0 0 1 1 0 2 2 5"), "Tin: control points on a line"),
-        ("words", control("0 0 a 1 1 0 2 2 5"), "Tin: unreadable coordinates"),
-        ("numbers left over", control("0 0 0 1 0 0 0 1"), "Tin: unreadable coordinates"),
-        ("another system", control(CORNERS) + crs, "Tin: points in more than one coordinate system"),
-        ("huge", control("0 0 0 1e300 0 0 0 1e300 0"), "Tin: could not be triangulated"),
+        ("nothing", String::new(), "tin-with-too-few-points"),
+        ("no point", control(""), "tin-with-too-few-points"),
+        ("two points", control("0 0 0 1 0 0"), "tin-with-too-few-points"),
+        ("one place", control("1 1 0 1 1 0 1 1 0"), "tin-with-too-few-points"),
+        ("a line", control("0 0 0 1 1 0 2 2 5"), "tin-points-on-a-line"),
+        ("words", control("0 0 a 1 1 0 2 2 5"), "tin-coordinates-unreadable"),
+        ("numbers left over", control("0 0 0 1 0 0 0 1"), "tin-coordinates-unreadable"),
+        ("another system", control(CORNERS) + crs, "tin-in-several-crs"),
+        ("huge", control("0 0 0 1e300 0 0 0 1e300 0"), "tin-not-triangulated"),
     ] {
         let document = try_text(&tin(&body), &ReadOptions::default()).expect("readable");
-        assert_eq!((document.count(), document.skipped(reason)), (0, 1), "{case}: {:?}", document.report);
+        assert_eq!((document.count(), document.reported(reason)), (0, 1), "{case}: {:?}", document.report);
         assert!(try_text(&tin(&body), &ReadOptions { strict: true, ..ReadOptions::default() }).is_err(), "{case}");
     }
 }
@@ -97,12 +97,12 @@ fn a_broken_tin_is_skipped_and_counted() {
 #[test]
 fn single_broken_points_cost_themselves() {
     let document = read_text(&tin(&control(&format!("nan 0 0 {CORNERS} 1e999 0 0 0 0 inf"))));
-    assert_eq!((document.count(), document.skipped("not finite numbers")), (2, 3), "{:?}", document.report);
+    assert_eq!((document.count(), document.reported("tin-point-not-finite")), (2, 3), "{:?}", document.report);
     let document = read_text(&tin(&control(&format!("{CORNERS} {CORNERS} 0 0 77"))));
-    assert_eq!((document.count(), document.warned("different heights")), (2, 1), "{:?}", document.report);
+    assert_eq!((document.count(), document.reported("tin-heights-differ")), (2, 1), "{:?}", document.report);
     let crossing = line("breakLines", "0 0 0 10 10 2") + &line("breakLines", "10 0 1 0 10 3 nan 0 0 4 4 4");
     let document = read_text(&tin(&(crossing + &control(CORNERS))));
-    assert_eq!(document.skipped("Tin: break line that crosses another one"), 1, "{:?}", document.report);
+    assert_eq!(document.reported("tin-break-lines-cross"), 1, "{:?}", document.report);
 }
 
 #[test]

@@ -44,9 +44,9 @@ fn transparency_of_a_city_is_decided_for_the_whole_file() {
         ] {
             let document = read_city(values, option, outside);
             assert_eq!(opacities(&document), expected, "{values:?} {option:?} outside: {outside}");
-            assert_eq!(document.warned("transparency read as opacity"), u64::from(said), "{values:?} {option:?}");
+            assert_eq!(document.reported("transparency-read-as-opacity"), u64::from(said), "{values:?} {option:?}");
             let missing = 2 - expected.len() as u64;
-            assert_eq!((document.skipped("fully transparent"), document.warned("are not drawn")), (missing, missing.min(1)));
+            assert_eq!((document.reported("polygon-transparent"), document.reported("transparent-surfaces-not-drawn")), (missing, missing.min(1)));
         }
     }
 }
@@ -54,13 +54,13 @@ fn transparency_of_a_city_is_decided_for_the_whole_file() {
 #[test]
 fn the_option_that_draws_invisible_surfaces_is_named() {
     let example = |document: &ParsedDocument, reason: &str| {
-        document.report.warnings.iter().find(|w| w.reason.contains(reason)).map(|w| w.example.clone()).unwrap_or_default()
+        document.report.findings.iter().find(|w| w.message.reason.code() == reason).map(|w| w.example.clone()).unwrap_or_default()
     };
-    let not_drawn = "fully transparent surfaces are not drawn";
+    let not_drawn = "transparent-surfaces-not-drawn";
     assert_eq!(example(&read_city(["1", "0"], Transparency::Auto, true), not_drawn), "1; --transparency inverted draws them");
     assert_eq!(example(&read_city(["1", "0"], Transparency::Inverted, true), not_drawn), "1; --transparency as-is draws them");
     assert_eq!(
-        example(&read_city(["1", "0.5"], Transparency::Auto, true), "read as opacity"),
+        example(&read_city(["1", "0.5"], Transparency::Auto, true), "transparency-read-as-opacity"),
         "1 of 2 materials would be invisible, and none opaque; --transparency as-is draws them so"
     );
 }
@@ -82,8 +82,8 @@ fn transparency_of_a_material_library_is_decided_for_the_whole_library() {
         let path = folder.put("a.obj", text);
         let document = read_with(&path, &OBJ, &ReadOptions { transparency: option, ..ReadOptions::default() }).expect("readable");
         assert_eq!(opacities(&document), expected, "{library} {option:?}");
-        assert_eq!(document.warned("transparency read as opacity"), u64::from(option == Auto && expected.len() == 2), "{library}");
-        assert_eq!(document.skipped("fully transparent"), 2 - expected.len() as u64, "{library}");
+        assert_eq!(document.reported("transparency-read-as-opacity"), u64::from(option == Auto && expected.len() == 2), "{library}");
+        assert_eq!(document.reported("face-transparent"), 2 - expected.len() as u64, "{library}");
     }
 }
 

@@ -14,6 +14,7 @@ from map3d.cli.import_reports import asset_warning_lines, left_alone_lines, plac
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import print_json, print_table
 from map3d.cli.progress import progress_bar
+from map3d.ingest.findings import skipped_count
 from map3d.requests import AddFiles
 
 if TYPE_CHECKING:
@@ -59,9 +60,7 @@ def _show(bar: Progress, task: Any) -> "OnFile":
 
 
 def _print(place: str | None, scene: str, done: Sequence[Any], failed: Sequence[tuple[str, str]], left_alone: Sequence[tuple[str, str]]) -> None:
-    rows = [
-        (item.asset, item.format, item.objects, item.triangles, sum(item.report.get("skipped", {}).values()), _placed(item.report)) for item in done
-    ]
+    rows = [(item.asset, item.format, item.objects, item.triangles, skipped_count(item.report), _placed(item.report)) for item in done]
     if rows:
         print_table(("asset", "format", "objects", "triangles", "skipped", "coordinates"), rows)
     for item in done:

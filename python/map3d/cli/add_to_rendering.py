@@ -16,7 +16,7 @@ from map3d.requests import AddLayers, AddViews
 @workspace_option
 def add_views(workspace: Workspace, rendering: str, request: AddViews, as_json: bool) -> None:
     """Add views to RENDERING. Existing views do not change. Run map3d render afterwards."""
-    from map3d.renderings.create import add_views
+    from map3d.lifecycle.create_rendering import add_views
 
     with workspace.open_catalogue() as catalogue:
         record = add_views(catalogue, rendering, request.views)
@@ -33,7 +33,7 @@ def add_views(workspace: Workspace, rendering: str, request: AddViews, as_json: 
 @workspace_option
 def add_layers(workspace: Workspace, rendering: str, request: AddLayers, as_json: bool) -> None:
     """Add layers to all views of RENDERING. Existing layers do not change. Run map3d render afterwards."""
-    from map3d.renderings.create import add_layers
+    from map3d.lifecycle.create_rendering import add_layers
 
     with workspace.open_catalogue() as catalogue:
         record = add_layers(catalogue, rendering, request)

@@ -15,7 +15,7 @@ def build_with_progress(
     workspace: Workspace, catalogue: Catalogue, scene: str, *, threads: int, max_memory_bytes: int | None = None
 ) -> dict[str, Any] | None:
     """Builds the scene if its files have changed, prints the report and returns it; returns None if the scene is up to date."""
-    from map3d.renderings.build import BUILD_BYTES, build, is_stale
+    from map3d.scenes.build import BUILD_BYTES, build, is_stale
 
     if not is_stale(workspace, catalogue, scene):
         return None

@@ -23,9 +23,9 @@ def command(workspace: Workspace, request: BuildAndCreateRendering, as_json: boo
     Look-at angle 0 looks north, 45 north-west, 90 west; the pitch is the angle below the horizon. The frame of each view is fixed now, so that
     later additions do not renumber any tile.
     """
-    from map3d.renderings.create import check_rendering, create_rendering
-    from map3d.renderings.outliers import choose_content
-    from map3d.renderings.style import choose_style
+    from map3d.lifecycle.create_rendering import check_rendering, create_rendering
+    from map3d.scenes.outliers import choose_content
+    from map3d.scenes.style import choose_style
 
     name, scene, memory = request.name, request.scene, request.max_memory_bytes
     with workspace.open_catalogue() as catalogue:

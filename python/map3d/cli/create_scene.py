@@ -15,7 +15,7 @@ from map3d.requests import CreateScene
 @workspace_option
 def command(workspace: Workspace, request: CreateScene, as_json: bool) -> None:
     """Create an empty scene NAME, and the workspace if it does not exist."""
-    from map3d.renderings.create_scene import check_scene, create_scene
+    from map3d.lifecycle.create_scene import check_scene, create_scene
 
     check_scene(request)
     with workspace.create().open_catalogue() as catalogue:

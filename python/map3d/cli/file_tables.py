@@ -7,8 +7,8 @@ import click
 
 from map3d.cli.output import plural, print_table
 from map3d.registry import ObjectKind
-from map3d.renderings.file_contents import FileContents, Finding, file_label, sum_findings
-from map3d.renderings.outlier_lines import extent_text
+from map3d.scenes.file_contents import FileContents, file_label, findings_of
+from map3d.scenes.outlier_lines import extent_text
 
 MAX_ROWS: Final = 20
 MAX_KINDS: Final = 8
@@ -51,18 +51,10 @@ def textures_text(file: FileContents) -> str:
 
 def findings_lines(files: Sequence[FileContents]) -> Iterator[str]:
     """Yields a line for each kind of defect, with an example."""
-    findings = sum_findings(files)
-    yield from map(finding_line, findings[:MAX_FINDINGS])
+    findings = findings_of(files)
+    yield from (cut(str(found), 400) for found in findings[:MAX_FINDINGS])
     if len(findings) > MAX_FINDINGS:
         yield f"{len(findings) - MAX_FINDINGS} more kinds of defects; --json lists them"
-
-
-def finding_line(finding: Finding) -> str:
-    example = f", e.g. {cut(finding.example, 300)}" if finding.example else ""
-    skipped = "skipped: " if finding.skipped else ""
-    if finding.whole_file and finding.count == 1:
-        return f"{finding.reason}: {cut(finding.example, 300)}"
-    return f"{finding.count:,} × {skipped}{finding.reason}{example}"
 
 
 def cut(text: str, limit: int = 80) -> str:

@@ -1,28 +1,28 @@
 """Lines about imports, for people: what the import reports of a scene warn about, and where on Earth the scene is."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.output import names_text
+from map3d.ingest.findings import findings, sum_findings
 from map3d.ingest.relief_grids import AS_TERRAIN
 
 MAX_LINES: Final = 20
-FILE: Final = "file"
-"""The scope of a warning about a whole file; its count is the number of files."""
 
 
 def warning_lines(reports: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
-    """Yields a line for each reason in the reports (asset → report): what is said of whole files first, then by count."""
-    found: dict[str, dict[str, Any]] = {}
-    for asset, report in reports.items():
-        for warning in report.get("warnings", []):
-            first = found.setdefault(warning["reason"], {**warning, "count": 0, "example": f"{asset}: {warning['example']}"})
-            first["count"] += warning["count"]
-    ordered = sorted(found.values(), key=lambda item: (item.get("scope") != FILE, -item["count"], item["reason"]))
-    yield from map(_line, ordered[:MAX_LINES])
-    if len(ordered) > MAX_LINES:
-        yield f"{len(ordered) - MAX_LINES} more kinds of warnings"
+    """Yields a line for each finding in the reports (asset → report)."""
+    named = (
+        replace(found, example=f"{asset}: {found.example}" if found.example else asset)
+        for asset, report in reports.items()
+        for found in findings(report)
+    )
+    found = sum_findings(named)
+    yield from map(str, found[:MAX_LINES])
+    if len(found) > MAX_LINES:
+        yield f"{len(found) - MAX_LINES} more kinds of warnings"
 
 
 def missing_textures_line(reports: Mapping[str, Mapping[str, Any]]) -> str | None:
@@ -50,11 +50,10 @@ def left_alone_lines(left_alone: Sequence[tuple[str, str]]) -> Iterator[str]:
 
 
 def asset_warning_lines(asset: str, report: Mapping[str, Any], limit: int = 8) -> Iterator[str]:
-    """Yields a line for each of the first warnings of one report; what is said of the whole file comes first."""
+    """Yields a line for each of the first findings of one report."""
     if (line := missing_textures_line({asset: report})) is not None:
         yield line
-    for warning in sorted(report.get("warnings", []), key=lambda item: item.get("scope") != FILE)[:limit]:
-        yield f"{asset}: {_line(warning)}"
+    yield from (f"{asset}: {found}" for found in findings(report)[:limit])
 
 
 def place_line(workspace: Workspace, catalogue: Catalogue, name: str) -> str | None:
@@ -68,10 +67,3 @@ def place_line(workspace: Workspace, catalogue: Catalogue, name: str) -> str | N
         return None
     place = scene_place(scene, content_centre(workspace, catalogue, name))
     return f"place: unknown; coordinates in {scene.crs.name}" if place is None else f"place: {place}, {scene.crs.name}"
-
-
-def _line(warning: Mapping[str, Any]) -> str:
-    count, reason, example = warning["count"], warning["reason"], warning["example"]
-    if warning.get("scope") != FILE:
-        return f"{count:,} × {reason}, e.g. {example}"
-    return f"{reason}: {example}" if count == 1 else f"{reason} ({count:,} files), e.g. {example}"

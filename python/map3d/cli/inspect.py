@@ -18,8 +18,8 @@ from map3d.requests import Inspect
 if TYPE_CHECKING:
     from map3d.catalogue import SceneCrs
     from map3d.ingest.import_files import OnFile
-    from map3d.renderings.file_contents import FileContents
-    from map3d.renderings.inspection import Inspection
+    from map3d.scenes.file_contents import FileContents
+    from map3d.scenes.inspection import Inspection
 
 
 @click.command("inspect")
@@ -32,7 +32,7 @@ def command(files: Sequence[Path], request: Inspect, as_json: bool) -> None:
     FILES are read as an import into one scene reads them; for a folder, every file in a known format. Nothing is imported.
     """
     from map3d.ingest.import_options import ImportOptions
-    from map3d.renderings.inspection import inspect_files
+    from map3d.scenes.inspection import inspect_files
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with progress_bar(*columns) as bar:
@@ -67,7 +67,7 @@ def _print(found: "Inspection") -> None:
 
 
 def _print_one(file: "FileContents", crs: "SceneCrs | None") -> None:
-    from map3d.renderings.outlier_lines import box_text
+    from map3d.scenes.outlier_lines import box_text
 
     rows = [
         ("file", f"{file.source}, {file.format}, {size_text(file.bytes)}"),
@@ -86,8 +86,8 @@ def _print_one(file: "FileContents", crs: "SceneCrs | None") -> None:
 
 def _summary(found: "Inspection") -> Iterator[tuple[str, str | None]]:
     """Yields what holds for all files together."""
-    from map3d.renderings.file_contents import sum_kinds
-    from map3d.renderings.outlier_lines import box_text, extent_text, place_text
+    from map3d.scenes.file_contents import sum_kinds
+    from map3d.scenes.outlier_lines import box_text, extent_text, place_text
 
     yield "all", f"{plural(len(found.files), 'file')}, {size_text(sum(file.bytes for file in found.files))}"
     yield "coordinates", None if found.crs is None else f"{found.crs.name}{'' if found.crs.epsg is None else f' (EPSG:{found.crs.epsg})'}"

@@ -43,7 +43,7 @@ class StyleFile(click.ParamType):  # type: ignore[type-arg]
     name = "FILE"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        from map3d.renderings.style import read_style
+        from map3d.scenes.style import read_style
 
         return {"rules": []} if value == "none" else value if isinstance(value, dict) else read_style(Path(value))
 

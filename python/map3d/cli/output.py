@@ -2,13 +2,15 @@
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, is_dataclass
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import click
 from rich.console import Console
 from rich.table import Table
 
+from map3d.ingest.findings import Finding
+from map3d.messages import Message
 from map3d.quantities import names_text, plural, size_text, time_text
 
 __all__ = ["console", "counts_text", "names_text", "plural", "print_json", "print_table", "size_text", "table", "time_text"]
@@ -51,4 +53,8 @@ def _text(cell: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else str(value)
+    if isinstance(value, Message):
+        return {**value.document, "text": str(value)}
+    if isinstance(value, Finding):
+        return value.document
+    return {item.name: getattr(value, item.name) for item in fields(value)} if is_dataclass(value) and not isinstance(value, type) else str(value)

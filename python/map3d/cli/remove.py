@@ -31,8 +31,8 @@ def remove_files(workspace: Workspace, scene: str, names: Sequence[str], yes: bo
     of other objects stay; an object of a removed file that returns gets its id back. If the removal is interrupted, run the command again.
     """
     from map3d.jobs.dead_workers import expire_dead_workers
-    from map3d.renderings.removal_checks import folder_bytes
-    from map3d.renderings.remove_files import find_files, is_built, remove_files
+    from map3d.lifecycle.removal_checks import folder_bytes
+    from map3d.lifecycle.remove_files import find_files, is_built, remove_files
 
     with workspace.open_catalogue() as catalogue:
         for record in catalogue.renderings(scene):
@@ -66,8 +66,8 @@ def remove_rendering(workspace: Workspace, rendering: str, yes: bool, as_json: b
     If the removal is interrupted, run the command again to complete it.
     """
     from map3d.jobs.dead_workers import expire_dead_workers
+    from map3d.lifecycle.remove_rendering import find_rendering, remove_rendering
     from map3d.publish.published_folders import folders_of
-    from map3d.renderings.remove_rendering import find_rendering, remove_rendering
 
     with workspace.open_catalogue() as catalogue:
         expire_dead_workers(catalogue, rendering)
@@ -96,8 +96,8 @@ def remove_scene(workspace: Workspace, scene: str, request: RemoveScene, yes: bo
     If the removal is interrupted, run the command again to complete it.
     """
     from map3d.jobs.dead_workers import expire_dead_workers
+    from map3d.lifecycle.remove_scene import find_scene, remove_scene
     from map3d.publish.published_folders import folders_of
-    from map3d.renderings.remove_scene import find_scene, remove_scene
 
     with workspace.open_catalogue() as catalogue:
         for record in catalogue.renderings(scene):

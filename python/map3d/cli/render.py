@@ -16,7 +16,7 @@ from map3d.cli.render_stats import print_summary, summary
 from map3d.requests import Render
 
 if TYPE_CHECKING:
-    from map3d.jobs.dask_pool import DaskPools
+    from map3d.jobs.dask.pool import DaskPools
     from map3d.jobs.run import Run, RunPlan, RunResult
     from map3d.jobs.run_settings import RunSettings
 
@@ -68,7 +68,7 @@ def _dask_pools(
     """Returns a context without value when there is no `address`."""
     if address is None:
         return nullcontext()
-    from map3d.jobs.dask_pool import DaskPools
+    from map3d.jobs.dask.pool import DaskPools
 
     return DaskPools(address, workspace, catalogue, replace(settings, workers=1), folder)
 

@@ -39,8 +39,8 @@ def command(
     request.
     """
     from map3d.operations.worker_process import WorkerProcess, is_worker_alive
-    from map3d.web.server import serve
-    from map3d.web.settings import load_settings
+    from map3d.web.http.settings import load_settings
+    from map3d.web.server.serve import serve
 
     page = page_path(workspace, rendering)
     if on_demand_quota is not None:

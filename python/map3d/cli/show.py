@@ -9,6 +9,7 @@ from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import counts_text, plural, print_json, print_table
 from map3d.errors import BadRequest
 from map3d.geometry.views import view_id
+from map3d.ingest.findings import findings, report_document
 from map3d.types import Vec3
 
 TOPICS = ("scenes", "scene", "renderings", "rendering", "report", "jobs", "quarantine")
@@ -96,15 +97,14 @@ def _rendering(catalogue: Catalogue, name: str, as_json: bool) -> None:
 def _report(catalogue: Catalogue, name: str, as_json: bool) -> None:
     assets = catalogue.assets(name)
     if as_json:
-        print_json({asset.name: asset.report for asset in assets})
+        print_json({asset.name: report_document(asset.report) for asset in assets})
         return
     for asset in assets:
         report = asset.report
         click.echo(f"{asset.name} ({asset.format}): {plural(report.get('objects', 0), 'object')}, {plural(report.get('triangles', 0), 'triangle')}")
-        rows = [("skipped", count, reason, "") for reason, count in sorted(report.get("skipped", {}).items())]
-        rows += [("warning", item["count"], item["reason"], item["example"]) for item in report.get("warnings", [])]
+        rows = [(found.reason.severity, str(found.message), found.example) for found in findings(report)]
         if rows:
-            print_table(("", "count", "reason", "e.g."), rows)
+            print_table(("", "finding", "example"), rows)
 
 
 def _jobs(catalogue: Catalogue, name: str, as_json: bool) -> None:

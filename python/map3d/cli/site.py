@@ -17,10 +17,11 @@ from map3d.cli.output import names_text, plural, size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
+from map3d.ingest.findings import skipped_count, warning_count
 from map3d.requests import Site
 
 if TYPE_CHECKING:
-    from map3d.renderings.site_files import ImportSummary
+    from map3d.site.files import ImportSummary
 
 
 @click.command("site")
@@ -38,9 +39,9 @@ def command(workspace: Workspace, request: Site) -> None:
     from map3d.jobs.run_settings import RunSettings
     from map3d.publish import check_folder
     from map3d.publish.report_page import REPORT_PAGE
-    from map3d.renderings.outliers import choose_content
-    from map3d.renderings.site_steps import create_site_rendering, store_report
-    from map3d.renderings.style import choose_style
+    from map3d.scenes.outliers import choose_content
+    from map3d.scenes.style import choose_style
+    from map3d.site.steps import create_site_rendering, store_report
 
     out, workers, memory = request.out, request.processes, request.max_memory_bytes
     check_folder(out)
@@ -74,8 +75,8 @@ def command(workspace: Workspace, request: Site) -> None:
 
 
 def _update_files(workspace: Workspace, catalogue: Catalogue, request: Site) -> "ImportSummary":
-    from map3d.renderings.site_files import update_files
-    from map3d.renderings.site_steps import site_files
+    from map3d.site.files import update_files
+    from map3d.site.steps import site_files
 
     with progress_bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as bar:
         task = bar.add_task("importing", total=None)
@@ -90,7 +91,7 @@ def _update_files(workspace: Workspace, catalogue: Catalogue, request: Site) -> 
 
 
 def _print_summary(summary: "ImportSummary") -> None:
-    from map3d.renderings.site_files import reasons
+    from map3d.site.files import reasons
 
     counts = f"{len(summary.unchanged)} unchanged, {len(summary.failed)} failed, {len(summary.removed)} removed"
     click.echo(f"imported {plural(len(summary.imported), 'file')}, {counts}")
@@ -116,7 +117,6 @@ def _print_problems(workspace: Workspace, catalogue: Catalogue, scene: str) -> N
     for line in warning_lines(by_asset):
         click.echo(line)
     reports = list(by_asset.values())
-    skipped = sum(sum(report.get("skipped", {}).values()) for report in reports)
-    warnings = sum(warning["count"] for report in reports for warning in report.get("warnings", []) if not warning["reason"].startswith("skipped: "))
+    skipped, warnings = sum(map(skipped_count, reports)), sum(map(warning_count, reports))
     if skipped or warnings:
         click.echo(f"skipped {plural(skipped, 'element')}; {plural(warnings, 'warning')}; map3d show report {scene} lists them")

@@ -6,10 +6,10 @@ from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.file_tables import print_files
 from map3d.cli.output import plural, size_text, time_text
 from map3d.renderings.cost_estimate import estimate
-from map3d.renderings.file_contents import file_contents, union
-from map3d.renderings.outlier_lines import extent_text, outlier_lines, place_text
-from map3d.renderings.outliers import read_outliers
-from map3d.renderings.site_steps import SiteRendering
+from map3d.scenes.file_contents import file_contents, union
+from map3d.scenes.outlier_lines import extent_text, outlier_lines, place_text
+from map3d.scenes.outliers import read_outliers
+from map3d.site.steps import SiteRendering
 
 SAMPLE_S = 3.0
 

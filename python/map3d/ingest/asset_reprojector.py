@@ -79,9 +79,9 @@ class AssetReprojector:
         }
 
     @property
-    def warnings(self) -> list[dict[str, Any]]:
-        """Returns what is odd about the coordinates, as warnings of a report."""
-        return [] if self._check is None else self._check.warnings
+    def findings(self) -> list[dict[str, Any]]:
+        """Returns what is odd about the coordinates, as findings of a report."""
+        return [] if self._check is None else self._check.findings
 
     def _check_crs_is_optional(self) -> None:
         if self._asset_crs is None and find_format(self._format).has_crs and not self._scene_is_local:

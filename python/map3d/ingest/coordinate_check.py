@@ -10,6 +10,7 @@ from map3d.errors import CrsError
 from map3d.geometry.area_of_use import AreaOfUse
 from map3d.geometry.crs import horizontal_crs
 from map3d.geometry.places import Place, find_place
+from map3d.ingest.findings import finding
 
 Points = NDArray[np.float64]
 """(n, 3), in the file's order of axes."""
@@ -73,13 +74,12 @@ class CoordinateCheck:
         return swapped
 
     @property
-    def warnings(self) -> list[dict[str, Any]]:
-        """Returns warnings as they are in a report."""
+    def findings(self) -> list[dict[str, Any]]:
+        """Returns what is odd, as findings of a report."""
         found = [] if self._axes_warning is None else [self._axes_warning]
         if self._outside:
-            reason = f"points outside the area of use of {self._horizontal.name}"
             hint = self._outside_hint if 2 * self._outside > self._points else ""
-            found.append({"reason": reason, "count": self._outside, "example": self._outside_example + hint})
+            found.append(finding("points-outside-area-of-use", self._outside, self._outside_example + hint, name=self._horizontal.name))
         return found
 
     def _decide(self, points: Points) -> None:
@@ -158,12 +158,12 @@ class CoordinateCheck:
         return position is not None and self._fits(*position)
 
     def _describe_swap(self, middle: NDArray[np.float64], written: tuple[float, float] | None) -> dict[str, Any]:
-        found = "northing, easting" if not self._horizontal.is_geographic else "longitude, latitude" if self._north_first else "latitude, longitude"
+        found = "northing-easting" if not self._horizontal.is_geographic else "longitude-latitude" if self._north_first else "latitude-longitude"
         example = f"{middle[0]:.10g} {middle[1]:.10g} is {self.place}"
         if self._horizontal.is_geographic and written is not None:
             option = f"urn:ogc:def:crs:EPSG::{self._horizontal.to_epsg()}" if self._north_first else "OGC:CRS84"
             example += f"; in the order of {self._label[:80]} it would be {find_place(*written)}: give --crs {option} if that is right"
-        return {"reason": f"axes swapped, so the file is read as {found}", "count": 1, "example": example, "scope": "file"}
+        return finding(f"axes-read-as-{found}", 1, example)
 
     def _count_outside(self, points: Points) -> None:
         """Counts points. The label is in doubt only if most of them are outside; a few are strays."""

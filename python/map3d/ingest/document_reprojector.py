@@ -11,9 +11,8 @@ from map3d.errors import CrsError
 from map3d.geometry.crs import horizontal_crs, parse_crs, vertical_crs_name
 from map3d.ingest.asset_reprojector import AssetReprojector
 from map3d.ingest.crs_transformer import Points
+from map3d.ingest.findings import finding, findings
 
-_TRANSFORMED: Final = "parts in another coordinate system than the rest of the file, transformed"
-_OVERRIDDEN: Final = "the file names more than one coordinate system; all parts are read in the one given"
 _MAX_NAME: Final = 80
 
 Transforms = NDArray[np.float64]
@@ -67,18 +66,16 @@ class DocumentReprojector:
         something odd under `strict`."""
         if self._errors and not self._used:
             raise next(iter(self._errors.values()))
-        odd = [warning for reprojector in self._reprojectors.values() for warning in reprojector.warnings]
+        odd = [item for reprojector in self._reprojectors.values() for item in reprojector.findings]
         if odd and self._strict:
-            raise CrsError("{reason}: {example}".format_map(odd[0]))
-        skipped = {_skip_reason(name): count for name, count in self._skipped.items()}
-        examples = [_warning(f"skipped: {_skip_reason(name)}", count, str(self._errors[name])) for name, count in self._skipped.items()]
+            raise CrsError(str(findings({"findings": odd})[0]))
+        skipped = [finding("part-crs-unusable", count, str(self._errors[name]), name=_short(name)) for name, count in self._skipped.items()]
         first = self._first or self._reprojector(self._document_crs)
         named = next(iter(self._used), None)
         return {
             **counts,
             **({} if self._stated or named is None else {"crs": named}),
-            "skipped": {**counts.get("skipped", {}), **skipped},
-            "warnings": [*counts.get("warnings", []), *examples, *odd, *self._notes()],
+            "findings": [*counts.get("findings", []), *skipped, *odd, *self._notes()],
             "placing": first.report,
         }
 
@@ -124,9 +121,10 @@ class DocumentReprojector:
             for name in self._names:
                 if name is not None and not any(_means(name, other) or _means(other, name) for other in distinct):
                     distinct.append(name)
-            return [_warning(_OVERRIDDEN, len(distinct), f"{', '.join(map(_short, distinct))}; read as {self._stated}")] if len(distinct) > 1 else []
+            example = f"{', '.join(map(_short, distinct))}; read as {self._stated}"
+            return [finding("several-crs-overridden", len(distinct), example)] if len(distinct) > 1 else []
         others = list(self._used)[1:]
-        return [_warning(_TRANSFORMED, self._used[name], f"{_short(name)}: {_describe(self._reprojectors[name])}") for name in others]
+        return [finding("parts-in-other-crs", self._used[name], f"{_short(name)}: {_describe(self._reprojectors[name])}") for name in others]
 
 
 def _means(name: str | None, other: str | None) -> bool:
@@ -151,13 +149,5 @@ def _describe(reprojector: AssetReprojector) -> str:
     return f"from {report['from']} to {report['to']}, {exact}{heights}"
 
 
-def _skip_reason(name: str | None) -> str:
-    return f"part in an unusable coordinate system = {_short(name)}"
-
-
 def _short(name: str | None) -> str:
     return "(none)" if name is None else name if len(name) <= _MAX_NAME else name[:_MAX_NAME] + "…"
-
-
-def _warning(reason: str, count: int, example: str) -> dict[str, Any]:
-    return {"reason": reason, "count": count, "example": example}

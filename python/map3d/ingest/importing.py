@@ -16,6 +16,7 @@ from map3d.errors import CrsError, ImportFailed, LimitExceeded, Map3dError, Subp
 from map3d.formats import find_format
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
 from map3d.ingest.content import find_content
+from map3d.ingest.findings import findings
 from map3d.ingest.import_inputs import ImportInputs, import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.import_pieces import import_pieces, pieces_key
@@ -31,7 +32,6 @@ from map3d.types import Box, Vec3
 
 ORIGIN_STEP_M: Final = 100.0
 MAX_MISSING_NAMES: Final = 200
-OTHER_LODS: Final = "nothing at the requested level of detail"
 MAX_FROM_ORIGIN_M: Final = _core.MAX_FROM_ORIGIN_M
 
 _NOT_IN_PIECES: Final = ("strict", "max_object_bytes", "max_appearance_bytes")
@@ -247,11 +247,7 @@ def _crs_text(crs: SceneCrs | None) -> str | None:
 
 
 def _list_skipped(report: Mapping[str, Any]) -> str:
-    examples = {warning["reason"]: f" ({warning['example']})" for warning in report.get("warnings", ()) if ": RasterRelief: " in warning["reason"]}
-    counts = sorted(report.get("skipped", {}).items())
-    skipped = ", ".join(f"{count} × {reason}{examples.get(f'skipped: {reason}', '')}" for reason, count in counts)
-    said = [f" ({warning['reason']}: {warning['example']})" for warning in report.get("warnings", ()) if warning["reason"] == OTHER_LODS]
-    return (f" (skipped: {skipped})" if skipped else "") + "".join(said)
+    return "".join(f"; {item}" for item in findings(report) if item.skipped or item.reason.code == "nothing-at-lod")
 
 
 def _parser_error(source: SourceDocument, limits: Limits, error: SubprocessDied | LimitExceeded) -> ImportFailed | LimitExceeded:

@@ -8,13 +8,13 @@ from typing import Any, Final
 
 from map3d import _core
 from map3d.ingest.document_reprojector import DocumentReprojector
+from map3d.ingest.findings import finding
 from map3d.ingest.texture_places import transform_positions
 from map3d.ingest.upright_check import Extent
 from map3d.subprocess import Handler, ReportProgress
 
 _REPORT_EVERY_TRIANGLES: Final = 50_000
 _MAX_NAMES: Final = 5
-_UNPLACED: Final = "implicit geometry without a place in the scene's coordinate system"
 
 
 def open_document_parser(_setup: Mapping[str, Any]) -> Handler:
@@ -51,14 +51,14 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
         unplaced = reader.set_instances(reprojector.transforms_to_world(transforms, reader.crs_names(), reader.instance_crs()))
     counts = json.loads(writer.finish(reader))
     if unplaced:
-        counts["skipped"] = {**counts.get("skipped", {}), _UNPLACED: unplaced}
+        counts["findings"].append(finding("implicit-geometry-without-place", unplaced))
     hints = extent.hints(request["path"]) if request["reader"].get("up") == "z" else []
     report = reprojector.report(counts)
-    report["warnings"] += hints
+    report["findings"] += hints
     grids = json.loads(reader.grids())
     if grids:
         report["grids"] = grids
         names = ", ".join(sorted({Path(grid["file"]).name for grid in grids})[:_MAX_NAMES])
-        report["warnings"].append({"reason": "RasterRelief: raster read as terrain", "count": len(grids), "example": names})
+        report["findings"].append(finding("relief-raster-read-as-terrain", len(grids), names))
     proposed = reprojector.proposed_crs
     return {"report": report, "crs": None if proposed is None else asdict(proposed)}

@@ -6,6 +6,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from map3d.ingest.findings import finding
+
 MIN_HEIGHT_M: Final = 100.0
 TIMES_DEPTH: Final = 3.0
 
@@ -27,4 +29,4 @@ class Extent:
         if not (np.isfinite([width, depth, height]).all() and height > MIN_HEIGHT_M and min(width, height) > TIMES_DEPTH * depth):
             return []
         example = f"{Path(path).name} is {width:,.0f} m wide, {depth:,.0f} m deep and {height:,.0f} m high; give --up y if it should stand upright"
-        return [{"reason": "the model seems to lie on its side", "count": 1, "example": example, "scope": "file"}]
+        return [finding("model-on-its-side", 1, example)]

@@ -5,13 +5,13 @@ from typing import Self
 
 from map3d.catalogue import Catalogue, RenderingRecord, State, Workspace
 from map3d.errors import Map3dError
-from map3d.renderings.build import open_scene
 from map3d.renderings.manifest_writer import Planned, write_manifest
 from map3d.renderings.plan import PlannedScene, planned_occupancy
-from map3d.renderings.scene_cache import scene_in_use
-from map3d.renderings.track_stores import read_manifest
+from map3d.scenes.build import open_scene
+from map3d.scenes.scene_cache import scene_in_use
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.occupancy import Numbers, Occupancy, numbers_of
+from map3d.tiles.track_stores import read_manifest
 from map3d.types import Box
 
 

@@ -17,12 +17,12 @@ from map3d.jobs.local_pool import LocalPools, PoolRunner
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
-from map3d.renderings.build import open_scene
 from map3d.renderings.manifest_writer import write_manifest
 from map3d.renderings.plan import PlannedBlocks, PlannedScene, plan_jobs
-from map3d.renderings.scene_cache import scene_in_use
-from map3d.renderings.track_stores import find_track, tiles_url
+from map3d.scenes.build import open_scene
+from map3d.scenes.scene_cache import scene_in_use
 from map3d.tiles.naming import morton
+from map3d.tiles.track_stores import find_track, tiles_url
 from map3d.types import BlockId
 
 MAX_PLANS: Final = 10

@@ -17,7 +17,7 @@ from map3d.jobs.open_jobs import count_open, has_jobs_left
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
-from map3d.renderings.track_stores import tiles_url
+from map3d.tiles.track_stores import tiles_url
 
 SWEEP_S = 60.0
 """How often an idle process sweeps a rendering with waiting jobs."""

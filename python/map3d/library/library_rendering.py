@@ -14,12 +14,12 @@ from map3d.jobs.run import Run, RunResult
 from map3d.jobs.run_counter import RunCounter
 from map3d.jobs.run_settings import RunSettings
 from map3d.library.on_progress import OnProgress, building, publishing
+from map3d.lifecycle.create_rendering import add_layers, add_views
+from map3d.lifecycle.remove_rendering import find_rendering, remove_rendering
 from map3d.publish import Published, publish
-from map3d.renderings.build import build_if_stale
 from map3d.renderings.cost_estimate import RenderingEstimate, estimate
-from map3d.renderings.create import add_layers, add_views
-from map3d.renderings.remove_rendering import find_rendering, remove_rendering
 from map3d.requests import AddLayers
+from map3d.scenes.build import build_if_stale
 from map3d.types import ViewAngles
 
 

@@ -13,13 +13,13 @@ from map3d.ingest.import_options import ImportOptions
 from map3d.jobs.dead_workers import expire_dead_workers
 from map3d.library.library_rendering import LibraryRendering, light_of
 from map3d.library.on_progress import OnProgress, building
-from map3d.renderings.build import build_if_stale
-from map3d.renderings.create import check_rendering, create_rendering
-from map3d.renderings.outliers import Outliers, choose_content, read_outliers
-from map3d.renderings.remove_files import find_files, is_built, remove_files
-from map3d.renderings.remove_scene import find_scene, remove_scene
-from map3d.renderings.style import choose_style
+from map3d.lifecycle.create_rendering import check_rendering, create_rendering
+from map3d.lifecycle.remove_files import find_files, is_built, remove_files
+from map3d.lifecycle.remove_scene import find_scene, remove_scene
 from map3d.requests import CreateRendering
+from map3d.scenes.build import build_if_stale
+from map3d.scenes.outliers import Outliers, choose_content, read_outliers
+from map3d.scenes.style import choose_style
 from map3d.types import DataEncoding, ViewAngles
 
 View = tuple[float, float] | str

@@ -9,7 +9,7 @@ from typing import Any, Self
 from map3d.catalogue import Catalogue, Workspace
 from map3d.library.library_rendering import LibraryRendering
 from map3d.library.library_scene import LibraryScene
-from map3d.renderings.create_scene import create_scene
+from map3d.lifecycle.create_scene import create_scene
 from map3d.requests import CreateScene
 
 

@@ -5,18 +5,19 @@ from typing import Any, Final
 
 from map3d.catalogue import Catalogue, OperationRecord, Workspace
 from map3d.errors import ImportFailed
+from map3d.ingest.findings import findings, skipped_count
 from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported
 from map3d.operations.operation_report import OperationReport
 from map3d.operations.uploaded_files import check_host_path, remove_staging, stage
 from map3d.quantities import plural
-from map3d.renderings import build
-from map3d.renderings.outliers import choose_content
-from map3d.renderings.style import choose_style
 from map3d.requests import AddFiles, Build
 from map3d.requests.json_values import from_json
 from map3d.requests.scenes import WorkLimits
+from map3d.scenes import build
+from map3d.scenes.outliers import choose_content
+from map3d.scenes.style import choose_style
 
 MAX_LINES: Final = 200
 
@@ -58,13 +59,13 @@ def _log(report: OperationReport, done: FilesImport) -> None:
 
 
 def _import_lines(item: Imported) -> Iterator[str]:
-    skipped, objects, triangles = sum(item.report.get("skipped", {}).values()), plural(item.objects, "object"), plural(item.triangles, "triangle")
+    skipped, objects, triangles = skipped_count(item.report), plural(item.objects, "object"), plural(item.triangles, "triangle")
     if skipped:
         yield f"{item.asset}: {objects}, {triangles}, skipped {plural(skipped, 'element')}"
     else:
         yield f"{item.asset}: {objects}, {triangles}"
-    for warning in item.report.get("warnings", ())[:20]:
-        yield f"{item.asset}: {warning['count']:,} × {warning['reason']}, e.g. {warning['example']}"
+    for found in findings(item.report)[:20]:
+        yield f"{item.asset}: {found}"
 
 
 def do_build(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:

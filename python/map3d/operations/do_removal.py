@@ -5,13 +5,13 @@ from typing import Final
 from map3d.catalogue import Catalogue, OperationRecord, Workspace
 from map3d.errors import NotFound
 from map3d.jobs.dead_workers import expire_dead_workers
+from map3d.lifecycle.remove_files import find_files, is_built, remove_files
+from map3d.lifecycle.remove_rendering import find_rendering, remove_rendering
+from map3d.lifecycle.remove_scene import find_scene, remove_scene
 from map3d.operations.do_import import build_if_stale
 from map3d.operations.operation_report import OperationReport
 from map3d.publish.published_folders import FOLDER, remove_published, remove_with_renderings
 from map3d.quantities import names_text, plural
-from map3d.renderings.remove_files import find_files, is_built, remove_files
-from map3d.renderings.remove_rendering import find_rendering, remove_rendering
-from map3d.renderings.remove_scene import find_scene, remove_scene
 from map3d.requests.scenes import WorkLimits
 
 

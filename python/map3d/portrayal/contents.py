@@ -16,7 +16,7 @@ from map3d.portrayal.styles import DEFAULT_STYLE, find_style
 from map3d.registry import AssetSummary, Registry
 from map3d.registry.object_boxes import unite_boxes
 from map3d.registry.registry import SCENE_ASSET
-from map3d.renderings.scene_cache import scene_in_use
+from map3d.scenes.scene_cache import scene_in_use
 from map3d.types import Box
 
 LOD_SCHEME: Final = "CityGML"

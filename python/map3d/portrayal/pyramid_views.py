@@ -14,9 +14,9 @@ from map3d.geometry.frames import NO_DEPTH, PinnedFrame, corners
 from map3d.geometry.views import Axes, track_id, uvd_from_local
 from map3d.portrayal.cameras import ViewCamera
 from map3d.portrayal.selection import Selection
-from map3d.renderings.track_stores import open_track, read_manifest
 from map3d.tiles.decode_tile import decode_tile, layer_with, paste, with_alpha
 from map3d.tiles.manifest import Manifest
+from map3d.tiles.track_stores import open_track, read_manifest
 from map3d.types import DEPTH_UNIT_M, Box, Layer, TileId
 
 ALIGNED_PX: Final = 0.02

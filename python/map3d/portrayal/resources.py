@@ -11,10 +11,10 @@ from map3d.geometry.views import track_id
 from map3d.portrayal.answers import REVALIDATE, Answer
 from map3d.portrayal.parameters import Parameters
 from map3d.portrayal.service_exception import ServiceException, invalid, quote
-from map3d.renderings.track_stores import open_track, read_manifest
 from map3d.tiles.decode_tile import as_layer, find_layer
 from map3d.tiles.manifest import FILE_NAME
 from map3d.tiles.naming import parse_tile
+from map3d.tiles.track_stores import open_track, read_manifest
 from map3d.types import TileId, check_name
 
 PREFIX: Final = "tiles"

@@ -21,11 +21,11 @@ from PIL import Image
 from map3d.catalogue import Workspace
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped, StoreError
 from map3d.geometry.views import track_id
-from map3d.renderings.track_stores import open_track, read_manifest, rendering_record
 from map3d.requests.publications import ExportFormat
 from map3d.tiles.decode_tile import as_layer, decode_channels, find_layer, layer_names
 from map3d.tiles.manifest import Manifest, ManifestView
 from map3d.tiles.tile_store import TileStore
+from map3d.tiles.track_stores import open_track, read_manifest, rendering_record
 from map3d.types import COLOR_KINDS, DATA_TILE_KINDS, FILE_SUFFIXES, Layer, TileId
 
 TILES_PER_STEP: Final = 256

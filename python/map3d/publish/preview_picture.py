@@ -10,11 +10,11 @@ from PIL import Image
 from map3d.catalogue import RenderingRecord, Workspace
 from map3d.errors import Corrupt
 from map3d.geometry.views import track_id
-from map3d.renderings.track_stores import open_track
 from map3d.tiles.decode_tile import decode_tile, layer_with, paste, with_alpha
 from map3d.tiles.light_colors import DEFAULT_LIGHT, Pixels, light_colors
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.preview import Preview, choose_preview
+from map3d.tiles.track_stores import open_track
 from map3d.types import COLOR_KINDS, Layer, TileId
 
 FILE: Final = "preview.jpg"

@@ -25,11 +25,11 @@ from map3d.publish.report_page import report_files
 from map3d.publish.size_report import SizeRow, report_sizes
 from map3d.publish.store_target import StoreTarget
 from map3d.publish.target import LAST, DryRun, Target
-from map3d.renderings.scene_cache import open_registry
-from map3d.renderings.site_report import read_report
-from map3d.renderings.track_stores import open_track, read_manifest, rendering_record
+from map3d.scenes.scene_cache import open_registry
+from map3d.site.report import read_report
 from map3d.tiles.manifest import FILE_NAME, Manifest, ManifestView
 from map3d.tiles.tile_store import TileStore
+from map3d.tiles.track_stores import open_track, read_manifest, rendering_record
 from map3d.tiles.viewer_files import PAGE, viewer_files, viewer_folder
 from map3d.types import COLOR_KINDS, FILE_SUFFIXES, Layer, TileId
 

@@ -11,8 +11,8 @@ from typing import Final
 from map3d.catalogue import Workspace
 from map3d.errors import BadRequest, Map3dError, NotFound
 from map3d.ingest.asset_removal import remove_folder
+from map3d.lifecycle.removal_checks import folder_bytes
 from map3d.publish.folder_target import draft_of, old_of
-from map3d.renderings.removal_checks import folder_bytes
 from map3d.requests.publications import FOLDER_NAME
 from map3d.tiles.manifest import FILE_NAME, Manifest
 

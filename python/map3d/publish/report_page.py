@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import Final
 
 from map3d.formats import title_of
+from map3d.ingest.findings import Finding
+from map3d.messages import message
 from map3d.publish.page_head import MAX_TITLE, add_policy, cut
 from map3d.quantities import plural, size_text, time_text
 from map3d.registry import ObjectKind
-from map3d.renderings.file_contents import FileContents, Finding, file_label, sum_findings, sum_kinds
-from map3d.renderings.outlier_lines import box_text, extent_text
-from map3d.renderings.site_report import SiteReport
+from map3d.scenes.file_contents import FileContents, file_label, findings_of, sum_kinds
+from map3d.scenes.outlier_lines import box_text, extent_text
+from map3d.site.report import SiteReport
 
 REPORT_PAGE: Final = "report.html"
 REPORT_STYLE: Final = "report.css"
@@ -19,8 +21,7 @@ MAX_ROWS: Final = 2000
 MAX_KINDS: Final = 12
 MAX_EXAMPLE: Final = 400
 
-_NOT_FOUND: Final = "image: file not found"
-"""The warning of the reader of CityGML."""
+_NOT_FOUND: Final = message("image-file-not-found")
 _STYLE_PATH: Final = Path(__file__).with_name(REPORT_STYLE)
 _PAGE: Final = """<!doctype html>
 <html lang="en">
@@ -107,7 +108,7 @@ def _scene(report: SiteReport, images: int, size: int) -> str:
 
 
 def _problems(report: SiteReport) -> str:
-    findings = sum_findings(report.files)
+    findings = findings_of(report.files)
     if not findings and not any(file.textures is not None and file.textures.missing for file in report.files):
         return '<section><h2>Warnings</h2><p class="good">Nothing in the imported files was skipped, and there are no warnings.</p></section>'
     missing = sum(file.textures.missing for file in report.files if file.textures is not None)
@@ -115,14 +116,13 @@ def _problems(report: SiteReport) -> str:
     is_listed = any(finding.reason == _NOT_FOUND for finding in findings)
     textures = [Finding(_NOT_FOUND, missing, next(names, ""))] if missing and not is_listed else []
     rows = "".join(map(_finding_row, [*textures, *findings]))
-    head = "<tr><th>Count</th><th>What</th><th>Example</th></tr>"
+    head = "<tr><th>What</th><th>Example</th></tr>"
     return f'<section><h2>Warnings</h2><table class="warnings"><thead>{head}</thead><tbody>{rows}</tbody></table></section>'
 
 
 def _finding_row(finding: Finding) -> str:
-    kind = '<span class="tag bad">skipped</span> ' if finding.skipped else ""
     example = escape(cut(finding.example, MAX_EXAMPLE))
-    return f'<tr><td class="number">{finding.count:,}</td><td>{kind}{escape(finding.reason)}</td><td class="example">{example}</td></tr>'
+    return f'<tr><td>{escape(str(finding.message))}</td><td class="example">{example}</td></tr>'
 
 
 def _left_out(report: SiteReport) -> str:

@@ -8,8 +8,8 @@ from typing import Any, Final
 from map3d import _core
 from map3d.catalogue import Catalogue, Job, PlannedJob, RenderingRecord, State, Track, Workspace
 from map3d.errors import BadRequest
-from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.plan import PlannedScene, plan_jobs, planned_occupancy, track_frame
+from map3d.scenes.build import is_stale, open_scene
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Occupancy, numbers_of
 from map3d.types import BlockId

@@ -11,12 +11,12 @@ from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
 from map3d.renderings.lon_lat import geographic_of
 from map3d.renderings.thumbnail import make_thumbnail
-from map3d.renderings.track_stores import find_track, share_manifest
 from map3d.tiles.block_versions import BlockVersions
 from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView, Thumbnail
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.tile_store import TileStore
+from map3d.tiles.track_stores import find_track, share_manifest
 from map3d.types import BlockId, Box, Vec3
 
 Planned = Mapping[str, Occupancy]

@@ -9,12 +9,12 @@ from typing import Any, Final
 from map3d.catalogue import JobResult, Lease, RenderingRecord, SceneRecord, Workspace
 from map3d.errors import NotFound
 from map3d.renderings.block_check import check_rendered
-from map3d.renderings.scene_cache import scene_in_use
-from map3d.renderings.track_stores import open_or_create_track
+from map3d.scenes.scene_cache import scene_in_use
 from map3d.subprocess import Limits, Message, Subprocess
 from map3d.tiles.naming import block_level, blocks_below
 from map3d.tiles.occupancy import block_bits
 from map3d.tiles.tile_store import StoredTile, TileStore
+from map3d.tiles.track_stores import open_or_create_track
 from map3d.types import BlockId, TileId
 
 RENDER_ENTRY: Final = "map3d.renderings.block_renderer:open_renderer"

@@ -82,7 +82,7 @@ class SceneLocation:
 
     def __init__(self, scene: SceneRecord, box: Box, place: GeographicPosition | None) -> None:
         """Raises BadRequest when the scene's coordinate system does not cover its position."""
-        from map3d.renderings.grid_north import GridNorth
+        from map3d.geometry.grid_north import GridNorth
 
         origin = scene.origin or (0.0, 0.0, 0.0)
         x, y = (origin[k] + (box[0][k] + box[1][k]) / 2 for k in (0, 1))

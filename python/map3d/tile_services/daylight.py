@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import Final
 
 from map3d.errors import BadRequest
+from map3d.geometry.grid_north import GridNorth
 from map3d.geometry.sun import sun_angles
-from map3d.renderings.grid_north import GridNorth
 from map3d.tiles.light_colors import WHITE, PictureLight, direction
 from map3d.tiles.manifest import Manifest
 from map3d.types import Vec3

@@ -5,13 +5,13 @@ from collections.abc import Callable
 
 from map3d import _core
 from map3d.catalogue import Catalogue, RenderingRecord, State, Track, Workspace
-from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.plan import track_frame
 from map3d.renderings.render_task import CACHE_BYTES
-from map3d.renderings.scene_cache import scene_in_use
-from map3d.renderings.track_stores import open_track
+from map3d.scenes.build import is_stale, open_scene
+from map3d.scenes.scene_cache import scene_in_use
 from map3d.tiles.naming import tiles_of_block
 from map3d.tiles.tile_store import TileStore
+from map3d.tiles.track_stores import open_track
 from map3d.types import BlockId
 from map3d.verify.findings import Findings
 

@@ -12,10 +12,10 @@ from map3d.geometry.views import track_id
 from map3d.publish.checksums import CHECKSUMS, file_digest, parse_checksums
 from map3d.publish.pmtiles_archive import Archive
 from map3d.registry.documents import ATTRIBUTES, SEARCH
-from map3d.renderings.track_stores import open_track, rendering_record
 from map3d.tiles.manifest import FILE_NAME, Manifest, ManifestView
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.tile_store import TileStore
+from map3d.tiles.track_stores import open_track, rendering_record
 from map3d.tiles.viewer_files import PAGE
 from map3d.types import Layer, TileId
 

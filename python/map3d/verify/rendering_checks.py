@@ -12,17 +12,17 @@ from map3d.errors import Map3dError
 from map3d.ingest.asset import asset_digest
 from map3d.ingest.asset_removal import is_removing
 from map3d.ingest.unfinished_imports import unfinished_imports
+from map3d.lifecycle.remove_rendering import is_rendering_removed
 from map3d.registry import Registry
-from map3d.renderings.build import is_stale, open_scene
 from map3d.renderings.manifest_writer import current_manifest
 from map3d.renderings.plan import PlannedBlocks, plan_jobs
-from map3d.renderings.remove_rendering import is_rendering_removed
-from map3d.renderings.scene_cache import has_assets, scene_in_use
-from map3d.renderings.scene_files import binary_files, check_file, check_ids, check_index
-from map3d.renderings.shared_scene import FILES
-from map3d.renderings.track_stores import read_manifest
+from map3d.scenes.build import is_stale, open_scene
+from map3d.scenes.scene_cache import has_assets, scene_in_use
+from map3d.scenes.scene_files import binary_files, check_file, check_ids, check_index
+from map3d.scenes.shared_scene import FILES
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.naming import block_of
+from map3d.tiles.track_stores import read_manifest
 from map3d.types import TileId
 from map3d.verify.findings import Findings
 from map3d.verify.track_checks import check_track

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from map3d.catalogue import Catalogue, State, Workspace
-from map3d.renderings.track_stores import find_track
+from map3d.tiles.track_stores import find_track
 from map3d.types import BlockId
 from map3d.verify.findings import Findings
 from map3d.verify.pixel_checks import verify_pixels

@@ -10,11 +10,11 @@ from map3d import _core
 from map3d.catalogue import Catalogue, Job, RenderingRecord, State, Track, Workspace
 from map3d.errors import Corrupt, Map3dError, StoreError
 from map3d.renderings.plan import planned_occupancy, track_frame
-from map3d.renderings.track_stores import find_track, track_url
 from map3d.tiles.decode_tile import decode_tile
 from map3d.tiles.naming import block_level, block_of, blocks_below, children, parent
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.tile_store import StoredBlock, TileStore
+from map3d.tiles.track_stores import find_track, track_url
 from map3d.types import BlockId, TileId
 from map3d.verify.findings import Findings
 

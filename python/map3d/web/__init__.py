@@ -1,7 +1,7 @@
-"""Web service: a thin ASGI route serves tiles, Flask serves everything else. Read-only, without logic of its own."""
+"""The HTTP front: parses requests, calls the functions that the command line calls too, and formats their results."""
 
-from map3d.web.asgi_app import create_app
-from map3d.web.public_url import public_url
-from map3d.web.server import serve
+from map3d.web.http.public_url import public_url
+from map3d.web.server.asgi_app import create_app
+from map3d.web.server.serve import serve
 
 __all__ = ["create_app", "public_url", "serve"]

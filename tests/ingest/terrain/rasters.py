@@ -74,7 +74,7 @@ class RecordingWriter:
     def finish(self, reader):
         assert reader is None
         self.finished = True
-        return json.dumps({"format": "?", "objects": len(self.objects), "triangles": self.triangle_count, "skipped": {}, "warnings": []})
+        return json.dumps({"format": "?", "objects": len(self.objects), "triangles": self.triangle_count, "findings": []})
 
     @property
     def triangle_count(self):

@@ -17,6 +17,7 @@ from map3d.ingest.terrain import terrain_rasters
 from map3d.ingest.terrain.orthophoto import Orthophoto
 from map3d.ingest.terrain.terrain_import import import_terrain
 from map3d.ingest.terrain.terrain_options import TerrainOptions
+from tests.findings import warned
 from tests.ingest.terrain.rasters import NORTH, WEST, RecordingWriter, colours, hills, write
 
 UTM = CRS.from_epsg(25832)
@@ -65,7 +66,7 @@ def test_a_huge_sparse_photo_has_images_only_where_it_has_blocks(tmp_path: Path,
     assert len(writer.materials) == len(images(tmp_path / "asset")) + with_dem
     tiles = len(writer.objects)
     assert tiles == (32 * 13 if with_dem else len(images(tmp_path / "asset")))
-    outside = [warning["count"] for warning in report["warnings"] if warning["reason"] == "tiles outside the photo"]  # type: ignore[attr-defined]
+    outside = [warning["count"] for warning in warned(report) if warning["code"] == "tiles-outside-photo"]  # type: ignore[attr-defined]
     assert outside == ([tiles - len(images(tmp_path / "asset"))] if with_dem else [])
 
 

@@ -18,6 +18,7 @@ from map3d.ingest.terrain import terrain_rasters
 from map3d.ingest.terrain.height_tint import COLOURS
 from map3d.ingest.terrain.terrain_import import import_terrain
 from map3d.ingest.terrain.terrain_options import TerrainOptions
+from tests.findings import skipped, warned
 from tests.ingest.terrain.rasters import NORTH, WEST, RecordingWriter, colours, from_bounds, hills, pixel_of, write
 
 UTM = CRS.from_epsg(25832)
@@ -215,8 +216,8 @@ def test_gaps_in_the_dem_are_gaps_in_the_terrain(tmp_path, folder, gap):
     columns, rows = (points[:, 0] - WEST).astype(int), (NORTH - points[:, 1]).astype(int)
     assert not hole[np.clip(rows, 0, 29), np.clip(columns, 0, 29)].any()
     assert len(points) == 32 * 32 - 75
-    assert report["skipped"] == {"grid points without a height": 75}
-    assert bool(report["warnings"]) == (gap == "implausible")
+    assert skipped(report) == {"grid-points-without-height": 75}
+    assert bool(warned(report)) == (gap == "implausible")
 
 
 def test_a_raster_of_gaps_has_no_object(tmp_path, folder):
@@ -238,7 +239,7 @@ def test_terrain_outside_the_photo_has_the_ground_colour(tmp_path, folder):
     plain = next(number for number, material in enumerate(writer.materials) if material["texture"] is None)
     beyond = [mesh for mesh in writer.meshes if mesh[3] == plain]
     assert all((mesh[0][:, 0] > WEST + 50).all() for mesh in beyond)
-    assert len(beyond) == report["warnings"][0]["count"] > 0
+    assert len(beyond) == warned(report)[0]["count"] > 0
     check_colours(writer_without(writer, plain), folder, lambda x, y: (200,) * 3 if x < WEST + 50 else (10, 20, 30) if x > WEST + 75 else None)
 
 
@@ -321,12 +322,12 @@ def test_a_palette_is_looked_up(tmp_path, folder):
 def test_heights_are_converted_to_metres(tmp_path, folder, unit, metres):
     writer, report = run(write(tmp_path / "dem.tif", np.full((1, 4, 4), 100, np.float32), units=unit and [unit]), None, folder)
     assert np.unique(writer.soup()[..., 2]) == pytest.approx([100 * metres])
-    assert report["warnings"] == []
+    assert warned(report) == []
 
 
 def test_an_unknown_unit_is_a_warning(tmp_path, folder):
     _, report = run(write(tmp_path / "dem.tif", hills(4, 4), units=["furlong"]), None, folder)
-    assert report["warnings"][0]["example"] == "furlong"
+    assert warned(report)[0]["example"] == "furlong"
 
 
 def test_scaled_integers_are_heights(tmp_path, folder):
@@ -337,7 +338,7 @@ def test_scaled_integers_are_heights(tmp_path, folder):
 def test_a_raster_without_crs_is_assumed_in_the_scenes_with_a_warning(tmp_path, folder):
     writer, report = run(write(tmp_path / "dem.tif", hills(4, 4), crs=None), None, folder)
     assert writer.soup()[..., 0].min() == WEST
-    assert report["warnings"][0]["reason"].startswith("raster without CRS")
+    assert warned(report)[0]["code"] == "raster-crs-assumed"
     assert report["crs"] is None
 
 
@@ -351,7 +352,7 @@ def test_the_stated_crs_replaces_that_of_both_rasters(tmp_path, folder, own):
     got, report = run(*rasters("wrong", own), tmp_path / "stated", CRS.from_epsg(25831), crs="EPSG:25832")
     assert np.array_equal(got.soup(), expected.soup())
     assert np.abs(got.soup()[..., 0] - WEST).min() > 100_000, "the coordinates are transformed"
-    assert report["warnings"] == []
+    assert warned(report) == []
     assert CRS.from_wkt(report["crs"]).to_epsg() == 25832
 
 

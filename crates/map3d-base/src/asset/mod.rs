@@ -8,7 +8,7 @@ mod writer;
 
 pub use boxes::MeshBoxes;
 pub use mapped::{AssetMesh, MESH_MAGIC, MESH_VERSION};
-pub use tables::{AssetReport, Instance, Material, Materials, Object, Rank, SurfaceClass, Warning, WarningScope, Wrap};
+pub use tables::{AssetReport, Finding, Instance, Material, Materials, Object, Rank, SurfaceClass, Wrap};
 pub use validation::{GeometryLimits, SkippedGeometry};
 pub use writer::AssetWriter;
 

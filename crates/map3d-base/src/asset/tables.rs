@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::reason::{Message, Reason};
+
 /// Class rank: decides between coplanar surfaces (spec/glossary.md).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
@@ -129,30 +131,21 @@ pub struct Object {
     pub attributes: BTreeMap<String, serde_json::Value>,
 }
 
-/// What a warning is about, where that is not one part of the file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum WarningScope {
-    File,
-}
-
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Warning {
-    pub reason: String,
+/// How often something was reported. `example`: the first occurrence: a name, a line, a file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    #[serde(flatten)]
+    pub message: Message,
     pub count: u64,
-    /// The first occurrence: a name, a line, a file.
     pub example: String,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub scope: Option<WarningScope>,
 }
 
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct AssetReport {
     pub format: String,
     pub objects: u64,
     pub triangles: u64,
-    pub skipped: BTreeMap<String, u64>,
-    pub warnings: Vec<Warning>,
+    pub findings: Vec<Finding>,
     /// The CRS as the source writes it.
     pub crs: Option<String>,
     /// Box of the kept geometry, in the coordinates of mesh.m3a.
@@ -160,23 +153,18 @@ pub struct AssetReport {
 }
 
 impl AssetReport {
-    /// Adds `n` to the count of a reason.
-    pub fn skip(&mut self, reason: &str, n: u64) {
-        if n > 0 {
-            *self.skipped.entry(reason.to_owned()).or_default() += n;
+    /// Adds `count` to what was reported; keeps the first example.
+    pub fn add(&mut self, message: impl Into<Message>, count: u64, example: impl FnOnce() -> String) {
+        let message = message.into();
+        match self.findings.iter_mut().find(|finding| finding.message == message) {
+            Some(finding) => finding.count += count,
+            None if count > 0 => self.findings.push(Finding { message, count, example: example() }),
+            None => {}
         }
     }
 
-    /// Counts a warning; keeps its first example.
-    pub fn warn(&mut self, reason: &str, example: impl Into<String>) {
-        match self.warnings.iter_mut().find(|w| w.reason == reason) {
-            Some(w) => w.count += 1,
-            None => self.warnings.push(Warning { reason: reason.to_owned(), count: 1, example: example.into(), scope: None }),
-        }
-    }
-
-    /// Adds a warning about the whole file.
-    pub fn warn_file(&mut self, reason: &str, example: impl Into<String>) {
-        self.warnings.push(Warning { reason: reason.to_owned(), count: 1, example: example.into(), scope: Some(WarningScope::File) });
+    /// Returns how often a reason was reported.
+    pub fn count(&self, reason: Reason) -> u64 {
+        self.findings.iter().filter(|finding| finding.message.reason == reason).map(|finding| finding.count).sum()
     }
 }

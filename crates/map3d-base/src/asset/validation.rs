@@ -1,6 +1,7 @@
 //! Validation of geometry on its way into an asset: triangles that are not finite, out of range or without area are skipped and counted.
 
 use super::Batch;
+use crate::Reason;
 use crate::vec3::{Vec3, length, triangle_normal};
 
 /// Limits of one asset's geometry.
@@ -28,13 +29,13 @@ pub struct SkippedGeometry {
 
 impl SkippedGeometry {
     /// Returns (reason, count) of every reason.
-    pub fn reasons(&self) -> [(&'static str, u64); 5] {
+    pub fn reasons(&self) -> [(Reason, u64); 5] {
         [
-            ("index out of range", self.index_out_of_range),
-            ("coordinate is not a finite number", self.not_finite),
-            ("coordinate too far from the origin", self.too_far),
-            ("zero area", self.zero_area),
-            ("texture coordinate is not a finite number", self.bad_uv),
+            (Reason::IndexOutOfRange, self.index_out_of_range),
+            (Reason::CoordinateNotFinite, self.not_finite),
+            (Reason::CoordinateTooFar, self.too_far),
+            (Reason::ZeroArea, self.zero_area),
+            (Reason::TextureCoordinateNotFinite, self.bad_uv),
         ]
     }
 }

@@ -131,7 +131,7 @@ impl AssetWriter {
         let text = if lines.is_empty() { String::new() } else { lines.join("\n") + "\n" };
         self.write("objects.jsonl", text.as_bytes())?;
         for (reason, count) in self.skipped.reasons() {
-            report.skip(reason, count);
+            report.add(reason, count, String::new);
         }
         report.objects = objects.len() as u64;
         report.triangles = self.triangles;

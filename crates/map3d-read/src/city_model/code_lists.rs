@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use map3d_base::Result;
+use map3d_base::{Reason, Result};
 
 use super::standard_codes::{Code, find_standard_label};
 use crate::document::asset_folder::{AssetFolder, FileError};
@@ -47,7 +47,7 @@ impl CodeLists {
             let list = match self.read_list(space) {
                 Ok(list) => Some(list),
                 Err(reason) => {
-                    report.note("code list not read; its codes are kept as they are", format!("{space}: {reason}"));
+                    report.note(Reason::CodeListNotRead, format!("{space}: {reason}"));
                     None
                 }
             };
@@ -57,7 +57,7 @@ impl CodeLists {
     }
 
     fn read_list(&mut self, space: &str) -> std::result::Result<CodeList, String> {
-        let file = self.folder.find(space).map_err(|error: FileError| error.reason().to_owned())?;
+        let file = self.folder.find(space).map_err(|error: FileError| error.describe().to_owned())?;
         self.bytes += file.path.metadata().map_err(|error| error.to_string())?.len();
         if self.bytes > MAX_LIST_BYTES {
             return Err(format!("code lists of more than {MAX_LIST_BYTES} bytes"));

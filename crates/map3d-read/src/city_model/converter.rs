@@ -2,8 +2,8 @@
 
 use std::collections::VecDeque;
 
-use map3d_base::Result;
 use map3d_base::asset::{Batch, Instance, Object, Rank};
+use map3d_base::{Reason, Result};
 
 use super::appearance::Appearances;
 use super::city_object::{CityObject, Representation};
@@ -20,16 +20,13 @@ use super::prototype_table::{PrototypePlacement, PrototypeTable, read_library_ob
 use super::shared_geometry::{DeferredXLink, MissingGeometry, SharedGeometry};
 use super::tessellate::{MaterialSources, Tessellator, ThematicSurface};
 use crate::document::ReliefGrid;
-use crate::document::asset_folder::AssetFolder;
+use crate::document::asset_folder::{AssetFolder, LIBRARY_OBJECT};
 use crate::document::file_head::FileHead;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::{LimitCheck, ReportBuilder};
 use crate::document::source_format::SourceFormat;
 
 const BATCH_TRIANGLES: usize = 1 << 14;
-
-/// The reason for polygons left out.
-pub const INTERIOR_POLYGON: &str = "polygon of an interior";
 
 /// What of a document is converted, and how.
 #[derive(Clone, Copy)]
@@ -174,7 +171,7 @@ impl FeatureConverter {
             match representation {
                 Representation::Surfaces(node) | Representation::RoofEdge(node) => {
                     let collected = collect_polygons(&context.city_object.geometry, &mut context.visits, node, false);
-                    report.skip_many("geometry that refers to itself", collected.cycles, || "a cycle of references".to_owned())?;
+                    report.skip_many(Reason::GeometryRefersToItself, collected.cycles, || "a cycle of references".to_owned())?;
                     self.tessellate_feature(context, f, &collected.polygons, report)?;
                     self.defer_xlinks(context, f, &collected.unresolved);
                 }
@@ -245,7 +242,7 @@ impl FeatureConverter {
                 continue;
             };
             let collected = collect_polygons(&self.shared.geometry, &mut self.shared.visits, node, link.reversed);
-            report.skip_many("geometry that refers to itself", collected.cycles, || self.objects[link.object as usize].name.clone())?;
+            report.skip_many(Reason::GeometryRefersToItself, collected.cycles, || self.objects[link.object as usize].name.clone())?;
             for unresolved in &collected.unresolved {
                 self.report_unresolved(unresolved.target, link.object, missing, report)?;
             }
@@ -257,8 +254,8 @@ impl FeatureConverter {
 
     fn report_unresolved(&self, target: Id, object: u32, missing: &MissingGeometry, report: &mut ReportBuilder) -> Result<()> {
         match missing.get(&target) {
-            Some((reason, href)) => report.warn(reason, href),
-            None => report.warn("unresolved reference", self.objects[object as usize].name.as_str()),
+            Some((reason, href)) => report.warn(*reason, href),
+            None => report.warn(Reason::ReferenceUnresolved, self.objects[object as usize].name.as_str()),
         }
     }
 
@@ -323,12 +320,12 @@ impl FeatureConverter {
     fn convert_library_object(&mut self, name: &str, object: u32, key: Id, report: &mut ReportBuilder) -> Result<()> {
         let file = match self.resolver.folder.find(name) {
             Ok(file) => file,
-            Err(error) => return report.warn(&format!("library object: {}", error.reason()), name),
+            Err(error) => return report.warn(error.reason(LIBRARY_OBJECT), name),
         };
         let head = FileHead::read(&file.path);
         let has_format = |format: &&SourceFormat| format.is_library_object && head.as_ref().is_ok_and(|head| (format.detect)(head));
         let Some(format) = self.conversion.formats.iter().find(has_format) else {
-            return report.warn("library object: unsupported format", name);
+            return report.warn(Reason::LibraryObjectFormatNotRead, name);
         };
         let mut document = (format.open)(&file.path, &self.resolver.options.without_format(), self.conversion.formats)?;
         let batches = read_library_object(document.as_mut(), object, &mut self.resolver)?;
@@ -360,9 +357,9 @@ impl FeatureConverter {
                 }
                 None => {
                     if let Some((reason, href)) = missing.get(&key) {
-                        report.warn(reason, href)?;
+                        report.warn(*reason, href)?;
                     }
-                    report.skip("implicit geometry without a prototype", || self.objects[instance.object as usize].name.clone())?;
+                    report.skip(Reason::ImplicitGeometryWithoutPrototype, || self.objects[instance.object as usize].name.clone())?;
                 }
             }
         }
@@ -391,7 +388,7 @@ fn count_interiors(context: &ConversionContext, lods: &[Option<u8>], report: &mu
             count += collect_polygons(geometry, &mut visits, node, false).polygons.len() as u64;
         }
     }
-    report.omit(INTERIOR_POLYGON, count);
+    report.omit(Reason::PolygonOfInterior, count);
 }
 
 /// Returns the finest level of detail at which an object's features are converted.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::fs;
 
 use map3d_base::asset::{Material, SurfaceClass, Wrap};
-use map3d_base::{Result, Vec3};
+use map3d_base::{Reason, Result, Vec3};
 
 use super::appearance::{
     Appearances, Parameterization, Resolution, ResolvedMaterial, ResolvedSurfaceData, SurfaceDataKind, TargetBinding, TexCoordRange,
@@ -20,8 +20,6 @@ use crate::document::material_table::MaterialTable;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::ReportBuilder;
 
-const OTHER_SYSTEM: &str = "georeferenced texture in another coordinate system than the surface, not used";
-const INEXACT: &str = "georeferenced texture in another coordinate system that no affine map reaches within half a pixel, not used";
 /// Samples along each side of a texture at which its transformation to another coordinate system is fitted.
 const FIT_SAMPLES: usize = 9;
 const MAX_FIT_ERROR_PX: f64 = 0.5;
@@ -222,7 +220,7 @@ impl MaterialResolver {
         let file = names.iter().find_map(|name| self.folder.find(name).ok());
         let geo_transform = file.and_then(|f| fs::read_to_string(f.path).ok()).and_then(|text| GeoTransform::parse_world_file(&text));
         if geo_transform.is_none() {
-            report.warn("georeferenced texture without reference point or world file", image)?;
+            report.warn(Reason::GeoreferencedTextureWithoutPlace, image)?;
         }
         Ok(geo_transform)
     }
@@ -249,7 +247,7 @@ impl MaterialResolver {
             }
             Parameterization::TexCoordList(range) => copy_listed_uvs(appearances, range, rings, uvs, report),
             Parameterization::None | Parameterization::XLink(_) => {
-                report.warn("texture without a parameterization", String::new())?;
+                report.warn(Reason::TextureWithoutParameterization, String::new())?;
                 Ok(false)
             }
         }
@@ -275,7 +273,7 @@ impl MaterialResolver {
             Fit::Affine(fitted) => fitted,
             Fit::Unknown => geo_transform,
             Fit::Inexact => {
-                report.warn(INEXACT, String::new())?;
+                report.warn(Reason::GeoreferencedTextureInexact, String::new())?;
                 return Ok(false);
             }
         };
@@ -289,7 +287,7 @@ impl MaterialResolver {
 fn check_place(is_other: bool, uvs: &[[f64; 2]], report: &mut ReportBuilder) -> Result<bool> {
     let overlaps = |axis: usize| uvs.iter().any(|uv| uv[axis] <= 1.0) && uvs.iter().any(|uv| uv[axis] >= 0.0);
     if is_other && !(overlaps(0) && overlaps(1)) {
-        report.warn(OTHER_SYSTEM, String::new())?;
+        report.warn(Reason::GeoreferencedTextureInOtherCrs, String::new())?;
         return Ok(false);
     }
     Ok(true)
@@ -306,7 +304,7 @@ fn copy_listed_uvs(
         let Some(found) = appearances.find_ring_uvs(range, ring.id) else {
             // The list belongs to other polygons of the target, or lacks one of the interior rings.
             if k > 0 {
-                report.warn("texture without coordinates for an interior ring", String::new())?;
+                report.warn(Reason::TextureCoordinatesMissingForHole, String::new())?;
             }
             return Ok(false);
         };
@@ -317,7 +315,7 @@ fn copy_listed_uvs(
             // The list omits the closing point.
             1 if !found.is_empty() => uvs.push(as_f64(&found[0])),
             _ => {
-                report.warn("fewer texture coordinates than points", format!("{} for {}", found.len(), ring.points.len()))?;
+                report.warn(Reason::TextureCoordinatesTooFew, format!("{} for {}", found.len(), ring.points.len()))?;
                 return Ok(false);
             }
         }

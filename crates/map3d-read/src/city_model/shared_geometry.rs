@@ -1,5 +1,6 @@
 //! Geometry that other city objects refer to, kept until the end of the document.
 
+use map3d_base::Reason;
 use map3d_base::asset::Rank;
 
 use super::geometry_arena::{GeometryArena, MAX_DEPTH, NO_NODE, NodeId, NodeKind, Ring};
@@ -16,7 +17,7 @@ pub struct DeferredXLink {
 }
 
 /// Geometry that a reference names and that was not found: the reason, and the reference as written.
-pub type MissingGeometry = IdMap<(&'static str, String)>;
+pub type MissingGeometry = IdMap<(Reason, String)>;
 
 #[derive(Default)]
 pub struct SharedGeometry {

@@ -1,7 +1,8 @@
 //! Tessellates polygons of the arena into the triangles of a batch.
 
 use map3d_base::asset::{Batch, Rank};
-use map3d_base::{Result, Vec3};
+use map3d_base::reason::Message;
+use map3d_base::{Reason, Result, Vec3};
 
 use super::appearance::{Appearances, ResolvedMaterial};
 use super::crs_table::{CrsNumber, DOCUMENT_CRS, HorizontalKey, estimate_metres_per_unit, horizontal_key};
@@ -13,9 +14,6 @@ use crate::document::material_table::shift_uvs;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::{LimitCheck, ReportBuilder};
 use crate::triangulation::triangulate::{Coverage, Triangulator};
-
-/// The reason for polygons left out.
-pub const INVISIBLE_POLYGON: &str = "fully transparent polygon";
 
 /// The feature that polygons belong to.
 pub struct ThematicSurface<'a> {
@@ -131,7 +129,7 @@ impl Tessellator {
         let rings: Vec<RingPoints> = rings.map(|r| RingPoints { id: r.id, points: arena.ring_points(r), crs: key }).collect();
         let material = self.resolve_material(geometry, polygon.node, &rings, surface, sources, report)?;
         if material.invisible {
-            report.omit(INVISIBLE_POLYGON, 1);
+            report.omit(Reason::PolygonTransparent, 1);
             return Ok(());
         }
         if !self.assemble_rings(&rings, material.textured, surface, report)? {
@@ -142,7 +140,7 @@ impl Tessellator {
         self.triangulator.set_scale(scale.copied().unwrap_or([1.0; 3]));
         match self.triangulator.triangulate(&self.points, &self.ring_ends) {
             Err(error) => return report.skip(error.reason(), || surface.object_name.to_owned()),
-            Ok(Coverage::Inexact) => report.warn("polygon with crossing rings", surface.object_name)?,
+            Ok(Coverage::Inexact) => report.warn(Reason::RingsCross, surface.object_name)?,
             Ok(Coverage::Exact) => {}
         }
         self.push_triangles(crs, polygon.reversed, surface, material);
@@ -181,18 +179,18 @@ impl Tessellator {
             let start = self.points.len();
             append_open_ring(ring.points, uvs, &mut self.points, &mut self.uvs);
             let limit = self.options.max_ring_vertices;
-            let reason = match self.points.len() - start {
-                0..3 => "ring with fewer than 3 points".to_owned(),
-                n if n as u64 > limit => format!("ring over the limit max_ring_vertices = {limit}"),
+            let reason: Message = match self.points.len() - start {
+                0..3 => Reason::RingWithTooFewPoints.into(),
+                n if n as u64 > limit => Reason::RingOverLimit.with("limit", limit),
                 _ => {
                     self.ring_ends.push(self.points.len());
                     if ring.points.first() != ring.points.last() {
-                        report.warn("ring that is not closed", surface.object_name)?;
+                        report.warn(Reason::RingNotClosed, surface.object_name)?;
                     }
                     continue;
                 }
             };
-            report.skip(&reason, || surface.object_name.to_owned())?;
+            report.skip(reason, || surface.object_name.to_owned())?;
             self.points.truncate(start);
             self.uvs.truncate(if textured { start } else { 0 });
             if k == 0 {
@@ -200,7 +198,7 @@ impl Tessellator {
             }
         }
         if rings.is_empty() {
-            report.skip("polygon without rings", || surface.object_name.to_owned())?;
+            report.skip(Reason::PolygonWithoutRings, || surface.object_name.to_owned())?;
         }
         Ok(!rings.is_empty())
     }

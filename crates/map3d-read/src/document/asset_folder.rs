@@ -5,7 +5,7 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-use map3d_base::{Error, Result};
+use map3d_base::{Error, Reason, Result};
 
 const MAX_NAME_BYTES: usize = 1024;
 
@@ -19,9 +19,49 @@ pub enum FileError {
     InvalidName,
 }
 
+pub const IMAGE: [Reason; 5] = [
+    Reason::ImageFileNotFound,
+    Reason::ImageFileOutsideFolder,
+    Reason::ImageUrlNotFetched,
+    Reason::ImageNotARegularFile,
+    Reason::ImageFileNameInvalid,
+];
+pub const LIBRARY_OBJECT: [Reason; 5] = [
+    Reason::LibraryObjectNotFound,
+    Reason::LibraryObjectOutsideFolder,
+    Reason::LibraryObjectUrlNotFetched,
+    Reason::LibraryObjectNotARegularFile,
+    Reason::LibraryObjectFileNameInvalid,
+];
+pub const MATERIAL_LIBRARY: [Reason; 5] = [
+    Reason::MaterialLibraryNotFound,
+    Reason::MaterialLibraryOutsideFolder,
+    Reason::MaterialLibraryUrlNotFetched,
+    Reason::MaterialLibraryNotARegularFile,
+    Reason::MaterialLibraryFileNameInvalid,
+];
+pub const OTHER_FILE: [Reason; 5] = [
+    Reason::OtherFileNotFound,
+    Reason::OtherFileOutsideFolder,
+    Reason::OtherFileUrlNotFetched,
+    Reason::OtherFileNotARegularFile,
+    Reason::OtherFileNameInvalid,
+];
+pub const RELIEF: [Reason; 5] = [
+    Reason::ReliefFileNotFound,
+    Reason::ReliefFileOutsideFolder,
+    Reason::ReliefUrlNotFetched,
+    Reason::ReliefFileNotARegularFile,
+    Reason::ReliefFileNameInvalid,
+];
+
 impl FileError {
-    /// Returns the reason as written to reports.
-    pub fn reason(self) -> &'static str {
+    /// Returns the reason as written to reports. `reasons`: those of the kind of file, in the order of the errors.
+    pub fn reason(self, reasons: [Reason; 5]) -> Reason {
+        reasons[self as usize]
+    }
+
+    pub fn describe(self) -> &'static str {
         match self {
             Self::NotFound => "file not found",
             Self::OutsideFolder => "file outside the asset's folder not read",
@@ -36,7 +76,7 @@ impl FileError {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LocatedFile {
     pub path: PathBuf,
-    pub oddity: Option<&'static str>,
+    pub oddity: Option<Reason>,
 }
 
 /// The folder in which a document's file names are resolved.
@@ -71,7 +111,7 @@ impl AssetFolder {
         let name = strip_file_scheme(name)?;
         let slashed = name.replace('\\', "/");
         let decoded = decode_percent(&slashed);
-        let spellings = [(name, None), (&slashed, Some("backslashes in a file name")), (&decoded, Some("percent-encoded file name"))];
+        let spellings = [(name, None), (&slashed, Some(Reason::FileNameBackslashes)), (&decoded, Some(Reason::FileNamePercentEncoded))];
         let mut error = FileError::NotFound;
         for (spelling, oddity) in spellings {
             match self.canonicalize_inside(&self.base.join(spelling)) {
@@ -84,7 +124,7 @@ impl AssetFolder {
             return Err(error);
         }
         let path = self.find_ignoring_case(&slashed).or_else(|| self.find_ignoring_case(&decoded)).ok_or(FileError::NotFound)?;
-        Ok(LocatedFile { path: self.canonicalize_inside(&path)?, oddity: Some("file name with different case") })
+        Ok(LocatedFile { path: self.canonicalize_inside(&path)?, oddity: Some(Reason::FileNameCaseDiffers) })
     }
 
     /// Returns true for a canonical path of a regular file under the root.

@@ -8,9 +8,10 @@ use std::sync::Arc;
 
 use imagesize::ImageType;
 use map3d_base::Result;
+use map3d_base::reason::{Message, Reason};
 use sha2::{Digest, Sha256};
 
-use super::asset_folder::AssetFolder;
+use super::asset_folder::{AssetFolder, IMAGE};
 use super::options::ReadOptions;
 use super::report_builder::ReportBuilder;
 
@@ -67,7 +68,7 @@ impl DocumentImages {
             let index = self.load(name, folder, options, report)?;
             self.by_name.insert(name.to_owned(), index);
         } else if self.by_name[name].is_none() {
-            report.warn("unusable image", name)?;
+            report.warn(Reason::ImageUnusable, name)?;
         }
         Ok(self.by_name[name].map(|n| &self.files[n]))
     }
@@ -76,7 +77,7 @@ impl DocumentImages {
         let file = match folder.find(name) {
             Ok(file) => file,
             Err(error) => {
-                report.warn(&format!("image: {}", error.reason()), name)?;
+                report.warn(error.reason(IMAGE), name)?;
                 return Ok(None);
             }
         };
@@ -86,7 +87,7 @@ impl DocumentImages {
         match DocumentImage::inspect(ImageSource::File(file.path), options) {
             Ok(image) => Ok(Some(self.add(image))),
             Err(reason) => {
-                report.warn(&format!("image: {reason}"), name)?;
+                report.warn(reason, name)?;
                 Ok(None)
             }
         }
@@ -103,22 +104,22 @@ impl DocumentImages {
 
 impl DocumentImage {
     /// Reads and checks the header, then hashes the bytes. The error is the reason for the report.
-    pub fn inspect(source: ImageSource, options: &ReadOptions) -> std::result::Result<Self, String> {
-        let unreadable = |e: io::Error| format!("unreadable ({})", e.kind());
+    pub fn inspect(source: ImageSource, options: &ReadOptions) -> std::result::Result<Self, Message> {
+        let unreadable = |e: io::Error| Reason::ImageUnreadable.with("error", e.kind().to_string());
         let mut input = source.open().map_err(unreadable)?;
-        let kind = imagesize::reader_type(&mut input).map_err(|_| "unknown format")?;
-        let extension = extension_for(kind).ok_or("unsupported format")?;
-        let size = kind.reader_size(&mut input).map_err(|_| "invalid header")?;
+        let kind = imagesize::reader_type(&mut input).map_err(|_| Reason::ImageFormatUnknown)?;
+        let extension = extension_for(kind).ok_or(Reason::ImageFormatNotRead)?;
+        let size = kind.reader_size(&mut input).map_err(|_| Reason::ImageHeaderInvalid)?;
         drop(input);
         let (width, height) = (size.width as u64, size.height as u64);
         if width == 0 || height == 0 {
-            return Err("no pixels".into());
+            return Err(Reason::ImageWithoutPixels.into());
         }
         if width.max(height) > options.max_image_side_px {
-            return Err(format!("side over the limit max_image_side_px = {}", options.max_image_side_px));
+            return Err(Reason::ImageSideOverLimit.with("limit", options.max_image_side_px));
         }
         if width * height > options.max_image_px {
-            return Err(format!("pixels over the limit max_image_px = {}", options.max_image_px));
+            return Err(Reason::ImagePixelsOverLimit.with("limit", options.max_image_px));
         }
         let key = compute_key(&source).map_err(unreadable)?;
         let transparent = extension == "png" && is_png_transparent(&source);

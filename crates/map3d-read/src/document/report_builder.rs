@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use map3d_base::asset::AssetReport;
+use map3d_base::reason::{Message, Reason, Severity};
 use map3d_base::{Error, Result};
 
 pub struct ReportBuilder {
@@ -47,64 +48,46 @@ impl ReportBuilder {
     }
 
     /// Counts a broken part that is left out. `location` describes where it is; the report keeps the first.
-    pub fn skip(&mut self, reason: &str, location: impl FnOnce() -> String) -> Result<()> {
+    pub fn skip(&mut self, reason: impl Into<Message>, location: impl FnOnce() -> String) -> Result<()> {
         self.skip_many(reason, 1, location)
     }
 
-    pub fn skip_many(&mut self, reason: &str, count: u64, location: impl FnOnce() -> String) -> Result<()> {
-        if count == 0 {
-            return Ok(());
-        }
-        if self.strict {
-            return Err(Error::format(&self.path, format!("{reason}: {}", location())));
-        }
-        if !self.report.skipped.contains_key(reason) {
-            self.report.warn(&format!("skipped: {reason}"), location());
-        } else if let Some(w) = self.report.warnings.iter_mut().find(|w| w.reason.strip_prefix("skipped: ") == Some(reason)) {
-            w.count += count;
-        }
-        self.report.skip(reason, count);
-        Ok(())
+    pub fn skip_many(&mut self, reason: impl Into<Message>, count: u64, location: impl FnOnce() -> String) -> Result<()> {
+        self.add(reason.into(), Severity::Skipped, count, location)
     }
 
     /// Counts valid parts that are left out by design; not an error even with `strict`.
-    pub fn omit(&mut self, reason: &str, count: u64) {
-        if count > 0 {
-            self.report.skip(reason, count);
-        }
+    pub fn omit(&mut self, reason: Reason, count: u64) {
+        self.add(reason.into(), Severity::Omitted, count, String::new).expect("not a fault");
+    }
+
+    /// Counts one valid part that is left out by design.
+    pub fn omit_one(&mut self, reason: Reason, example: &str) {
+        self.add(reason.into(), Severity::Omitted, 1, || example.to_owned()).expect("not a fault");
     }
 
     /// Counts a fault that was repaired or worked around.
-    pub fn warn(&mut self, reason: &str, example: impl Into<String>) -> Result<()> {
-        if self.strict {
-            return Err(Error::format(&self.path, format!("{reason}: {}", example.into())));
-        }
-        self.report.warn(reason, example);
-        Ok(())
+    pub fn warn(&mut self, reason: impl Into<Message>, example: impl Into<String>) -> Result<()> {
+        self.add(reason.into(), Severity::Warning, 1, || example.into())
     }
 
     /// Counts something worth knowing that is not a fault; not an error even with `strict`.
-    pub fn note(&mut self, reason: &str, example: impl Into<String>) {
-        self.report.warn(reason, example);
+    pub fn note(&mut self, reason: Reason, example: impl Into<String>) {
+        self.add(reason.into(), Severity::Note, 1, || example.into()).expect("not a fault");
     }
 
-    /// Notes something about the whole file.
-    pub fn note_file(&mut self, reason: &str, example: impl Into<String>) {
-        self.report.warn_file(reason, example);
-    }
-
-    /// Reports a fault of the whole file that was repaired or worked around.
-    pub fn warn_file(&mut self, reason: &str, example: String) -> Result<()> {
-        if self.strict {
-            return Err(Error::format(&self.path, format!("{reason}: {example}")));
+    fn add(&mut self, message: Message, severity: Severity, count: u64, example: impl FnOnce() -> String) -> Result<()> {
+        debug_assert_eq!(message.reason.severity(), severity, "{}", message.reason.code());
+        if count > 0 && self.strict && matches!(severity, Severity::Warning | Severity::Skipped) {
+            return Err(Error::format(&self.path, format!("{message} Example: {}", example())));
         }
-        self.report.warn_file(reason, example);
+        self.report.add(message, count, example);
         Ok(())
     }
 
-    /// Returns the number of parts left out for a reason.
-    pub fn skipped(&self, reason: &str) -> u64 {
-        self.report.skipped.get(reason).copied().unwrap_or(0)
+    /// Returns the number of parts with a reason.
+    pub fn count(&self, reason: Reason) -> u64 {
+        self.report.count(reason)
     }
 
     /// Returns an error if a quantity exceeds its limit.

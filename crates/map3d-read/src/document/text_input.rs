@@ -7,7 +7,7 @@ use std::path::Path;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 use encoding_rs_io::{DecodeReaderBytes, DecodeReaderBytesBuilder};
-use map3d_base::{Error, Result};
+use map3d_base::{Error, Reason, Result};
 use memchr::{memchr, memchr_iter};
 
 use super::byte_source::ByteSource;
@@ -26,7 +26,7 @@ pub enum TextInput {
 /// Something wrong with the encoding of a document: a reason and an example, as in a report.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct EncodingFault {
-    pub reason: &'static str,
+    pub reason: Reason,
     pub example: String,
 }
 
@@ -98,7 +98,7 @@ pub fn open_checked_xml(path: &Path) -> Result<(TextInput, Vec<EncodingFault>)> 
     let declared = find_declared_encoding(&head);
     let known = declared.as_deref().and_then(|name| Encoding::for_label(name.as_bytes()));
     if let (Some(name), None) = (declared, known) {
-        faults.push(EncodingFault { reason: "unknown encoding, read as UTF-8", example: name });
+        faults.push(EncodingFault { reason: Reason::EncodingUnknown, example: name });
     }
     let encoding = detect_utf16_without_bom(&head).or(known).unwrap_or(UTF_8);
     if encoding != UTF_8 || Encoding::for_bom(&head).is_some() {
@@ -137,13 +137,13 @@ fn find_utf8_fault(file: &mut ByteSource) -> io::Result<Option<EncodingFault>> {
         let n = match file.read(&mut buffer[kept..]) {
             Err(_) if file.is_gzip() => {
                 let example = format!("after {} unpacked bytes; what comes before is kept", file.end_at_damage());
-                break Some(EncodingFault { reason: "gzip file cut or damaged", example });
+                break Some(EncodingFault { reason: Reason::GzipDamaged, example });
             }
             read => read?,
         };
         let bytes = &buffer[..kept + n];
         if let Some(at) = memchr(0, bytes) {
-            break Some(EncodingFault { reason: "zero bytes left out", example: format!("byte {}", position + at as u64) });
+            break Some(EncodingFault { reason: Reason::ZeroBytesLeftOut, example: format!("byte {}", position + at as u64) });
         }
         match std::str::from_utf8(bytes) {
             Ok(_) if n == 0 => break None,
@@ -160,7 +160,7 @@ fn find_utf8_fault(file: &mut ByteSource) -> io::Result<Option<EncodingFault>> {
             }
             Err(e) => {
                 let example = format!("byte {}", position + e.valid_up_to() as u64);
-                break Some(EncodingFault { reason: "not UTF-8 as declared; other bytes read as Windows-1252", example });
+                break Some(EncodingFault { reason: Reason::NotUtf8AsDeclared, example });
             }
         }
     };

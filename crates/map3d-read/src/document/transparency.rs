@@ -1,5 +1,6 @@
 //! Decides for a whole file whether its transparency is opacity: some exporters write 1 for opaque, so that walls vanish.
 
+use map3d_base::Reason;
 use serde::Deserialize;
 
 use super::report_builder::ReportBuilder;
@@ -43,8 +44,8 @@ impl TransparencyCounts {
             Transparency::Auto => {
                 if seems_inverted {
                     let (invisible, materials) = (self.invisible, self.materials);
-                    report.note_file(
-                        "transparency read as opacity",
+                    report.note(
+                        Reason::TransparencyReadAsOpacity,
                         format!("{invisible} of {materials} materials would be invisible, and none opaque; --transparency as-is draws them so"),
                     );
                 }
@@ -58,6 +59,6 @@ impl TransparencyCounts {
 pub fn report_invisible(count: u64, inverted: bool, report: &mut ReportBuilder) {
     if count > 0 {
         let other = if inverted { "as-is" } else { "inverted" };
-        report.note_file("fully transparent surfaces are not drawn", format!("{count}; --transparency {other} draws them"));
+        report.note(Reason::TransparentSurfacesNotDrawn, format!("{count}; --transparency {other} draws them"));
     }
 }

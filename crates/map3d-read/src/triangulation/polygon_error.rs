@@ -1,5 +1,7 @@
 //! Why a polygon has no triangles.
 
+use map3d_base::Reason;
+
 /// The reason why a polygon has no triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PolygonError {
@@ -13,12 +15,12 @@ pub enum PolygonError {
 
 impl PolygonError {
     /// Returns the reason as written to reports.
-    pub fn reason(self) -> &'static str {
+    pub fn reason(self) -> Reason {
         match self {
-            Self::NoArea => "polygon without area",
-            Self::NotFinite => "coordinate is not a finite number",
-            Self::TooManyVertices => "polygon with too many vertices to triangulate",
-            Self::NumericalFailure => "polygon that could not be triangulated",
+            Self::NoArea => Reason::PolygonWithoutArea,
+            Self::NotFinite => Reason::CoordinateNotFinite,
+            Self::TooManyVertices => Reason::PolygonWithTooManyVertices,
+            Self::NumericalFailure => Reason::PolygonNotTriangulated,
         }
     }
 }

@@ -4,7 +4,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use map3d_base::Vec3;
+use map3d_base::{Reason, Vec3};
 use spade::handles::{FixedDirectedEdgeHandle, FixedFaceHandle, FixedVertexHandle, InnerTag};
 use spade::{Intersection, LineIntersectionIterator, PositionInTriangulation, Triangulation};
 
@@ -55,15 +55,15 @@ pub enum TinError {
 
 impl TinError {
     /// Returns the reason as written to reports.
-    pub fn reason(self) -> &'static str {
+    pub fn reason(self) -> Reason {
         match self {
-            Self::Unreadable => "Tin: unreadable coordinates",
-            Self::MixedCrs => "Tin: points in more than one coordinate system",
-            Self::TooManyCrs => "Tin: points in one of too many coordinate systems",
-            Self::TooFewPoints => "Tin: fewer than 3 control points",
-            Self::OnALine => "Tin: control points on a line",
-            Self::TooManyPoints => "Tin: too many points or crossing lines",
-            Self::NumericalFailure => "Tin: could not be triangulated",
+            Self::Unreadable => Reason::TinCoordinatesUnreadable,
+            Self::MixedCrs => Reason::TinInSeveralCrs,
+            Self::TooManyCrs => Reason::TinCrsTooMany,
+            Self::TooFewPoints => Reason::TinWithTooFewPoints,
+            Self::OnALine => Reason::TinPointsOnALine,
+            Self::TooManyPoints => Reason::TinWithTooManyPoints,
+            Self::NumericalFailure => Reason::TinNotTriangulated,
         }
     }
 }

@@ -166,14 +166,9 @@ impl ParsedDocument {
         self.triangles().iter().map(|t| compute_area(t.corners)).sum()
     }
 
-    /// Returns the number of warnings whose reason contains a text.
-    pub fn warned(&self, reason: &str) -> u64 {
-        self.report.warnings.iter().filter(|w| w.reason.contains(reason)).map(|w| w.count).sum()
-    }
-
-    /// Returns the number of skipped parts whose reason contains a text.
-    pub fn skipped(&self, reason: &str) -> u64 {
-        self.report.skipped.iter().filter(|(r, _)| r.contains(reason)).map(|(_, n)| n).sum()
+    /// Returns how often reasons whose code begins so were reported.
+    pub fn reported(&self, code: &str) -> u64 {
+        self.report.findings.iter().filter(|f| f.message.reason.code().starts_with(code)).map(|f| f.count).sum()
     }
 
     pub fn material_of(&self, triangle: usize) -> &Material {

@@ -108,7 +108,7 @@ impl Soup {
         let objects = self.all_faces().map(|f| f.object).chain(self.instances.iter().map(|i| i.object)).max().map_or(1, |k| k + 1);
         let tables = Materials { materials, instances: self.instances.clone() };
         let report = writer.finish(&tables, &vec![Object::default(); objects as usize], AssetReport::default()).expect("finish");
-        assert_eq!(report.triangles, self.all_faces().count() as u64, "{:?}", report.skipped);
+        assert_eq!(report.triangles, self.all_faces().count() as u64, "{:?}", report.findings);
         let ids: Vec<u8> = (1..=objects).flat_map(u32::to_le_bytes).collect();
         std::fs::write(asset.join("ids.u32"), ids).expect("ids");
     }

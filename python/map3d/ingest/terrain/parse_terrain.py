@@ -14,6 +14,7 @@ from rasterio.errors import RasterioError
 from map3d.errors import CrsError, ImportFailed
 from map3d.geometry.crs import is_local, parse_crs
 from map3d.ingest.crs_transformer import choose_scene_crs
+from map3d.ingest.findings import finding
 from map3d.ingest.scene_crs import LOCAL, to_scene_crs
 from map3d.ingest.terrain.placed_rasters import PlacedRasters
 from map3d.ingest.terrain.raster_georeference import open_raster
@@ -77,13 +78,13 @@ def _parse_placed(request: Mapping[str, Any], placed: PlacedRasters, report_prog
     placing = {"from": terrain["crs"] and CRS.from_user_input(terrain["crs"]).name, "to": proposed.name, **terrain["projection"]}
     if placement.place is not None:
         placing["place"] = str(placement.place)
-    terrain["warnings"] += [*placement.warnings, *placed.warnings]
+    terrain["findings"] += [*placement.findings, *placed.findings]
     if far:
         path, away_m = far[0]
         example = f"{path.name} lies {away_m / 1000:,.0f} km from the other rasters; its CRS may be wrong, else import it alone"
-        terrain["warnings"].append({"reason": "raster left out, far from the others", "count": len(far), "example": example, "scope": "file"})
+        terrain["findings"].append(finding("raster-far-from-others", len(far), example))
     if faults:
-        terrain["warnings"].append({"reason": "raster skipped", "count": len(faults), "example": faults[0]})
+        terrain["findings"].append(finding("raster-unreadable", len(faults), faults[0]))
     counts = {"elevation": len(dems), "imagery": len(orthos)}
     return {"report": {**terrain, "rasters": counts, "placing": placing}, "crs": asdict(proposed)}
 

@@ -20,6 +20,7 @@ from rasterio.errors import NotGeoreferencedWarning
 from map3d.errors import CrsError, ImportFailed
 from map3d.geometry.crs import is_local, parse_crs
 from map3d.ingest.coordinate_check import CoordinateCheck
+from map3d.ingest.findings import finding
 from map3d.ingest.terrain.raster_georeference import Array, PlaneTransformer, find_driver, own_crs
 from map3d.ingest.virtual_raster import check_virtual_raster
 
@@ -40,7 +41,7 @@ class PlacedRasters:
     def __init__(self, folder: Path, grids: Mapping[str, Mapping[str, Any]], stated_crs: str | None) -> None:
         """`folder`: a new one for virtual rasters; `grids`: path of a raster → the grid of its relief; `stated_crs`: the user's choice."""
         self._folder, self._grids, self._stated = folder, grids, stated_crs
-        self.warnings: list[dict[str, Any]] = []
+        self.findings: list[dict[str, Any]] = []
 
     def __enter__(self) -> "PlacedRasters":
         return self
@@ -87,7 +88,7 @@ class PlacedRasters:
             there = np.array(PlaneTransformer(place.crs, own)(*there))
         apart = float(np.hypot(*(there - _apply(raster.transform, corners))).max())
         if not apart <= MAX_APART_PX * max(map(abs, raster.res)):
-            self.warnings.append({"reason": ELSEWHERE, "count": 1, "example": f"{path.name}: {apart:,.6g} apart, in units of its CRS"})
+            self.findings.append(finding("relief-raster-elsewhere", 1, f"{path.name}: {apart:,.6g} apart, in units of its CRS"))
 
 
 def _apply(transform: Affine, pixels: Array) -> Array:

@@ -11,6 +11,7 @@ from map3d.errors import CrsError
 from map3d.geometry.crs import is_local
 from map3d.geometry.places import Place, find_place
 from map3d.ingest.coordinate_check import CoordinateCheck
+from map3d.ingest.findings import finding
 from map3d.ingest.terrain.raster_georeference import open_raster, own_crs
 
 NEAR_M: Final = 10_000.0
@@ -19,14 +20,14 @@ MAX_DEGREE_PIXEL: Final = 0.01
 
 
 class RasterPlacement:
-    """Collects warnings about the rasters of one terrain. `place`: that of the first raster with a CRS."""
+    """Collects what is odd about the rasters of one terrain. `place`: that of the first raster with a CRS."""
 
     def __init__(self, stated_crs: str | None, scene_crs: str | None, scene_origin: Sequence[float] | None) -> None:
         """`stated_crs`: the user's choice; `scene_crs`: WKT, "local", or None while the scene has no CRS; `scene_origin`: near its content."""
         self._stated, self._origin = stated_crs, scene_origin
         self._scene_is_local = scene_crs is not None and is_local(scene_crs)
         self._scene = None if scene_crs is None or self._scene_is_local else CRS.from_user_input(scene_crs)
-        self.warnings: list[dict[str, Any]] = []
+        self.findings: list[dict[str, Any]] = []
         self.place: Place | None = None
 
     def check(self, path: Path) -> None:
@@ -37,7 +38,7 @@ class RasterPlacement:
         if own is not None and not own.is_geographic and self._scene_is_local:
             self._check_distance(path, bounds, f"its CRS is {own.name}, but the scene is in local metres, where")
             self._warn(
-                "raster's CRS not used, because the scene is in local metres",
+                "raster-crs-not-used",
                 f"{path.name}; import the other files with --crs to give the scene a CRS, e.g. --crs {_code(own)}",
             )
         elif own is not None:
@@ -47,7 +48,7 @@ class RasterPlacement:
         elif self._scene_is_local:
             away = self._distance_m(bounds)
             if away:
-                self._warn("raster far from the scene's content", f"{path.name} lies {away / 1000:,.0f} km from it")
+                self._warn("raster-far-from-scene", f"{path.name} lies {away / 1000:,.0f} km from it")
 
     def _check_without_crs(self, path: Path, bounds: Any, pixel: float) -> None:
         x, y = (bounds.left + bounds.right) / 2, (bounds.bottom + bounds.top) / 2
@@ -59,7 +60,7 @@ class RasterPlacement:
         if self._scene is not None:
             self._check_distance(path, bounds, f"without a CRS of its own, with the scene's ({self._scene.name})")
         elif not self._scene_is_local:
-            self._warn("raster without CRS, read as local metres", f"{path.name}; name its CRS with --crs, e.g. --crs EPSG:25832")
+            self._warn("raster-read-as-local", f"{path.name}; name its CRS with --crs, e.g. --crs EPSG:25832")
 
     def _check_area(self, path: Path, own: CRS, bounds: Any) -> None:
         columns = [1, 0, 2] if own.is_geographic and own.axis_info[0].direction == "north" else [0, 1, 2]
@@ -70,9 +71,8 @@ class RasterPlacement:
         except CrsError as error:
             raise CrsError(f"{path}: {error}") from error
         self.place = self.place or check.place
-        for warning in check.warnings:
-            reason = warning["reason"].replace("points", "corners of the raster")
-            self.warnings.append({**warning, "reason": reason, "example": f"{path.name}: {warning['example']}"})
+        for found in check.findings:
+            self.findings.append({**found, "code": "raster-outside-area-of-use", "example": f"{path.name}: {found['example']}"})
 
     def _check_distance(self, path: Path, bounds: Any, words: str) -> None:
         away = self._distance_m(bounds)
@@ -91,12 +91,12 @@ class RasterPlacement:
         away = float(np.hypot(max(bounds.left - x, x - bounds.right, 0.0), max(bounds.bottom - y, y - bounds.top, 0.0)))
         return away if away > margin else 0.0
 
-    def _warn(self, reason: str, example: str) -> None:
-        for warning in self.warnings:
-            if warning["reason"] == reason:
-                warning["count"] += 1
+    def _warn(self, code: str, example: str) -> None:
+        for found in self.findings:
+            if found["code"] == code:
+                found["count"] += 1
                 return
-        self.warnings.append({"reason": reason, "count": 1, "example": example, "scope": "file"})
+        self.findings.append(finding(code, 1, example))
 
 
 def _code(crs: CRS) -> str:

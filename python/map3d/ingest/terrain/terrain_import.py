@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from map3d.errors import BadRequest, LimitExceeded, Stopped
+from map3d.ingest.findings import finding
 from map3d.ingest.terrain import terrain_rasters
 from map3d.ingest.terrain.height_tint import HeightTint, write_tint
 from map3d.ingest.terrain.orthophoto import TextureTile
@@ -179,17 +180,14 @@ def _link(source: Path, target: Path) -> None:
 
 
 def _report(rasters: TerrainRasters, counts: dict[str, Any], content: _TerrainContent) -> dict[str, Any]:
-    """Adds counts and warnings about the rasters to the counts of the core."""
-    warnings = [*counts.get("warnings", []), *rasters.warnings()]
-    found = content.counts
-    for reason, count in (("heights beyond ±100 km count as gaps", found.implausible), ("tiles outside the photo", found.untextured)):
-        if count:
-            warnings.append({"reason": reason, "count": count, "example": Path(rasters.base.name).name})
+    """Adds what was found about the rasters to the report of the core."""
+    found, name = content.counts, Path(rasters.base.name).name
+    by_code = {"grid-points-without-height": found.gaps, "heights-implausible": found.implausible, "tiles-outside-photo": found.untextured}
+    counted = [finding(code, count, name) for code, count in by_code.items() if count]
     return {
         **counts,
         "format": CLASS,
-        "skipped": {**counts.get("skipped", {}), **({"grid points without a height": found.gaps} if found.gaps else {})},
-        "warnings": warnings,
+        "findings": [*counts.get("findings", []), *rasters.findings(), *counted],
         "crs": rasters.crs_wkt,
         "projection": {"operation": rasters.scene_from_base.description, "heights": "unchanged"},
     }

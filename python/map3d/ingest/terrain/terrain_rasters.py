@@ -11,6 +11,7 @@ from pyproj import CRS
 
 from map3d.errors import LimitExceeded
 from map3d.geometry.crs import vertical_unit_m
+from map3d.ingest.findings import finding
 from map3d.ingest.terrain.orthophoto import ALIGN_PX, MARGIN_PX, Orthophoto
 from map3d.ingest.terrain.raster_georeference import PlaneTransformer, RasterGeoreference, open_raster, own_crs, raster_crs
 from map3d.ingest.terrain.raster_mosaic import MosaicHeightField, MosaicPhoto, RasterMosaic
@@ -112,15 +113,15 @@ class TerrainRasters:
             side //= 2
         return self._checked(VertexGrid(pixel_centre_positions(height, parts), pixel_centre_positions(width, parts), side), parts)
 
-    def warnings(self) -> list[dict[str, Any]]:
-        """Returns the warnings about the rasters, before any tile is built."""
-        found = [warning for raster in (self.dem, self.ortho) for warning in _mosaic_warnings(raster)]
+    def findings(self) -> list[dict[str, Any]]:
+        """Returns what is odd about the rasters, before any tile is built."""
+        found = [item for raster in (self.dem, self.ortho) for item in _mosaic_findings(raster)]
         unknown = [unit for unit in map(self._unknown_unit, _datasets(self.dem)) if unit]
         if unknown:
-            found.append({"reason": "unknown height unit, assumed metres", "count": len(unknown), "example": unknown[0]})
+            found.append(finding("height-unit-unknown", len(unknown), unknown[0]))
         if self._scene_crs is not None and self._options.crs is None:
             missing = [raster for raster in (self.dem, self.ortho) if raster is not None and raster.crs is None]
-            found += [{"reason": "raster without CRS, assumed the scene's", "count": 1, "example": Path(raster.name).name} for raster in missing]
+            found += [finding("raster-crs-assumed", 1, Path(raster.name).name) for raster in missing]
         return found
 
     def _checked(self, grid: VertexGrid, parts: int) -> VertexGrid:
@@ -200,10 +201,10 @@ def _unit(dem: Any) -> str:
     return (dem.units[0] or "").strip().lower()
 
 
-def _mosaic_warnings(raster: Any) -> list[dict[str, Any]]:
+def _mosaic_findings(raster: Any) -> list[dict[str, Any]]:
     """Says at which resolution rasters of different ones are read."""
     if not isinstance(raster, RasterMosaic) or len(raster.pixels) == 1:
         return []
     pixels = ", ".join(f"{pixel:.6g}" for pixel in raster.pixels)
     example = f"{Path(raster.name).name}: pixels of {pixels}; all are read with pixels of {raster.pixel:.6g}"
-    return [{"reason": "rasters of different resolution", "count": 1, "example": example, "scope": "file"}]
+    return [finding("raster-resolutions-differ", 1, example)]

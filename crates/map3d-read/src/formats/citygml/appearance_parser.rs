@@ -2,8 +2,8 @@
 
 use std::io::BufRead;
 
-use map3d_base::Result;
 use map3d_base::asset::Wrap;
+use map3d_base::{Reason, Result};
 
 use super::coordinates::parse_numbers;
 use super::positions::{NamedPoint, read_point};
@@ -119,7 +119,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             self.appearances.surface_data[first..].iter_mut().for_each(|d| d.in_theme = true);
             self.appearances.theme_xlinks.extend(xlinks);
         } else {
-            self.report.note("appearance of another theme ignored", theme);
+            self.report.note(Reason::AppearanceOfOtherTheme, theme);
         }
     }
 
@@ -137,10 +137,10 @@ impl<R: BufRead> AppearanceParser<'_, R> {
         let is_front = !properties.is_back;
         let kind = build_kind(&type_name, properties);
         if kind == SurfaceDataKind::Unsupported {
-            self.report.warn("unsupported surface data", type_name)?;
+            self.report.warn(Reason::SurfaceDataNotRead, type_name)?;
         }
         if !is_front {
-            self.report.note("appearance of back sides used only for surfaces without one of the front", describe(&kind));
+            self.report.note(Reason::AppearanceOfBackSide, describe(&kind));
         }
         let number = self.appearances.add_surface_data(id, SurfaceData { kind, is_front, in_theme: false, resolution: Resolution::Unresolved });
         targets.into_iter().for_each(|t| self.appearances.bind(t.target, number, t.parameterization));
@@ -181,7 +181,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             "clamp" => Some(Wrap::Clamp),
             "border" => Some(Wrap::Border),
             _ => {
-                self.report.warn("unknown wrap mode", text)?;
+                self.report.warn(Reason::WrapModeUnknown, text)?;
                 None
             }
         })
@@ -228,7 +228,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
                     self.references.add_own_target(target.id, href);
                 }
                 if target.document != OWN_DOCUMENT && !self.references.is_in_other_document() {
-                    self.report.note("appearance for surfaces of another file, used where both are imported together", href);
+                    self.report.note(Reason::AppearanceForOtherFile, href);
                 }
                 Ok(Some(target))
             }
@@ -267,7 +267,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             "TexCoordList" => self.read_tex_coord_list(target)?,
             "TexCoordGen" => self.read_tex_coord_gen()?,
             other => {
-                self.report.warn("unknown texture parameterization", other)?;
+                self.report.warn(Reason::TextureParameterizationUnknown, other)?;
                 self.xml.skip()?;
                 Parameterization::None
             }
@@ -303,7 +303,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
         self.values.clear();
         let start = self.appearances.uvs.len() as u32;
         if parse_numbers(self.text, self.values).is_none() || !self.values.len().is_multiple_of(2) {
-            return self.report.warn("unreadable texture coordinates", self.text.chars().take(40).collect::<String>());
+            return self.report.warn(Reason::TextureCoordinatesUnreadable, self.text.chars().take(40).collect::<String>());
         }
         self.appearances.uvs.extend(self.values.as_chunks::<2>().0.iter().map(|uv| uv.map(|v| v as f32)));
         self.appearances.rings.push(RingTexCoords { ring, start, count: self.appearances.uvs.len() as u32 - start });
@@ -316,7 +316,7 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             let matrix = self.read_numbers()?.and_then(|v| <[f64; 12]>::try_from(v).ok());
             match matrix {
                 Some(matrix) => parameterization = self.appearances.add_matrix(matrix),
-                None => self.report.warn("unreadable worldToTexture matrix", "TexCoordGen")?,
+                None => self.report.warn(Reason::TextureMatrixUnreadable, "TexCoordGen")?,
             }
         }
         Ok(parameterization)

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use map3d_base::Result;
+use map3d_base::{Reason, Result};
 use serde_json::Value;
 
 use super::address::read_address;
@@ -28,7 +28,6 @@ use crate::document::options::ReadOptions;
 use crate::document::report_builder::ReportBuilder;
 
 const MAX_LOD: u8 = 4;
-const PART_OF_OTHER_FILE: &str = "part of an object in another file, not followed";
 
 pub struct CityObjectParser<'a> {
     pub xml: &'a mut XmlReader,
@@ -68,7 +67,7 @@ impl CityObjectParser<'_> {
         let (type_name, attributes) = (type_name.clone(), std::mem::take(attributes));
         let is_known = |feature: &Feature| feature.kind != FeatureKind::Unknown || !feature.representations.is_empty();
         if self.feature(number).kind == FeatureKind::Unknown && self.city_object.features[number as usize..].iter().any(is_known) {
-            self.report.note("unknown element; features inside it are read", type_name.as_str());
+            self.report.note(Reason::ElementUnknown, type_name.as_str());
         }
         if self.feature(owner).keeps_attributes {
             add_data_type(&mut self.feature(owner).attributes, property, &type_name, attributes);
@@ -169,7 +168,7 @@ impl CityObjectParser<'_> {
         if let Some(href) = self.xml.attribute("href").map(Cow::into_owned) {
             match self.references.find_own_id(&href) {
                 Some(id) if !local_name.starts_with("interior") => self.feature(number).xlinks.push(id),
-                None if holds_parts(&local_name) => self.report.warn(PART_OF_OTHER_FILE, href)?,
+                None if holds_parts(&local_name) => self.report.warn(Reason::PartInOtherFile, href)?,
                 _ => {}
             }
         }
@@ -238,7 +237,7 @@ impl CityObjectParser<'_> {
             return self.read_geometry(number);
         }
         if local_name == "ClearanceSpace" {
-            self.report.omit("solid of an open space", 1);
+            self.report.omit(Reason::SolidOfOpenSpace, 1);
             return self.xml.skip();
         }
         if is_generic_attribute_object(local_name) {
@@ -300,13 +299,13 @@ impl CityObjectParser<'_> {
     fn read_lod_property(&mut self, number: u32, lod: u8) -> Result<()> {
         match &self.xml.local_name()["lod0".len()..] {
             "Solid" if is_open_space(&self.city_object.features[number as usize].type_name) => {
-                self.report.omit("solid of an open space", 1);
+                self.report.omit(Reason::SolidOfOpenSpace, 1);
                 self.xml.skip()
             }
             "ImplicitRepresentation" => self.read_implicit_representation(number, lod),
             "RoofEdge" => self.read_surfaces(number, lod, Representation::RoofEdge),
             "TerrainIntersection" | "TerrainIntersectionCurve" | "MultiCurve" | "Network" | "Point" | "MultiPoint" | "PointCloud" => {
-                self.report.omit("points and lines", 1);
+                self.report.omit(Reason::PointsAndLines, 1);
                 self.xml.skip()
             }
             _ => self.read_surfaces(number, lod, Representation::Surfaces),
@@ -319,7 +318,7 @@ impl CityObjectParser<'_> {
         if self.feature(number).type_name == "CityObjectGroup" {
             return self.xml.skip();
         }
-        self.report.note("geometry without a level of detail read as level 0", self.xml.local_name());
+        self.report.note(Reason::GeometryWithoutLod, self.xml.local_name());
         let first = self.city_object.geometry.nodes.len() as u32;
         let format = PositionFormat::new(self.feature(number).crs);
         let read = self.geometry_parser().read_element(NO_NODE, format);

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use map3d_base::Result;
 use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object};
+use map3d_base::{Reason, Result};
 
 use super::city_object_parser::CityObjectParser;
 use super::dictionary_parser::read_dictionary;
@@ -15,9 +15,8 @@ use super::xml_reader::{Malformed, XmlEvent, XmlReader};
 use crate::city_model::appearance::ThemeSelection;
 use crate::city_model::city_object::CityObject;
 use crate::city_model::code_lists::CodeLists;
-use crate::city_model::converter::{Conversion, FeatureConverter, INTERIOR_POLYGON};
+use crate::city_model::converter::{Conversion, FeatureConverter};
 use crate::city_model::crs_table::{CrsNumber, CrsTable, DOCUMENT_CRS};
-use crate::city_model::tessellate::INVISIBLE_POLYGON;
 use crate::document::asset_folder::AssetFolder;
 use crate::document::images::DocumentImage;
 use crate::document::options::ReadOptions;
@@ -156,7 +155,7 @@ impl CityGmlReader {
     fn report_malformed(&mut self) {
         let Some(Malformed { byte, what }) = self.xml.malformed().cloned() else { return };
         let line = count_lines(self.report.path(), byte).map_or_else(|_| String::new(), |line| format!(", line {line}"));
-        self.report.note_file("document broken", format!("at byte {byte}{line} ({what}); what comes before is kept"));
+        self.report.note(Reason::DocumentBroken, format!("at byte {byte}{line} ({what}); what comes before is kept"));
     }
 
     /// Reads the geometry that is in other documents of the folder.
@@ -181,14 +180,14 @@ impl CityGmlReader {
         self.read_other_documents()?;
         self.converter.convert_deferred(self.references.missing(), &mut self.report)?;
         self.instances = self.converter.finish_instances(self.references.missing(), &mut self.report)?;
-        let interiors = self.report.skipped(INTERIOR_POLYGON);
+        let interiors = self.report.count(Reason::PolygonOfInterior);
         if interiors > 0 {
-            self.report.note_file("polygons of interiors are not drawn", format!("{interiors}; --interiors draws them"));
+            self.report.note(Reason::InteriorsNotDrawn, format!("{interiors}; --interiors draws them"));
         }
         if let Some(found) = self.converter.other_lods() {
-            self.report.note_file("nothing at the requested level of detail", found);
+            self.report.note(Reason::NothingAtLod, found);
         }
-        report_invisible(self.report.skipped(INVISIBLE_POLYGON), self.inverted, &mut self.report);
+        report_invisible(self.report.count(Reason::PolygonTransparent), self.inverted, &mut self.report);
         Ok(())
     }
 }
@@ -198,10 +197,10 @@ const MAX_NAMED_THEMES: usize = 5;
 
 fn report_theme(theme: &ThemeSelection, report: &mut ReportBuilder) {
     match (&theme.requested, theme.selected()) {
-        (None, Some(selected)) if theme.has_several() => report.note("appearance theme used", selected),
+        (None, Some(selected)) if theme.has_several() => report.note(Reason::ThemeUsed, selected),
         (Some(requested), _) if !theme.names().is_empty() && !theme.names().contains(&requested.as_str()) => {
             let names = theme.names().into_iter().take(MAX_NAMED_THEMES).collect::<Vec<_>>().join(", ");
-            report.note("requested appearance theme is not in the file", format!("{requested}; the file has {names}"));
+            report.note(Reason::ThemeNotInFile, format!("{requested}; the file has {names}"));
         }
         _ => {}
     }

@@ -1,6 +1,6 @@
 //! Parses GML surfaces and solids into the arena.
 
-use map3d_base::{Result, Vec3};
+use map3d_base::{Reason, Result, Vec3};
 
 use super::coordinates::{Separators, parse_coordinates, parse_points};
 use super::positions::{PositionFormat, PositionsRead};
@@ -105,10 +105,9 @@ impl GeometryParser<'_> {
             self.read_group(parent, format).map(Some)
         } else {
             if is_point_or_curve(local_name) {
-                self.report.omit("points and lines", 1);
+                self.report.omit(Reason::PointsAndLines, 1);
             } else {
-                self.report.omit("unsupported geometry type", 1);
-                self.report.note("unsupported geometry element", local_name);
+                self.report.omit_one(Reason::GeometryTypeNotRead, local_name);
             }
             self.xml.skip()?;
             Ok(None)

@@ -1,6 +1,6 @@
 //! Parses the grid of a `dem:RasterRelief`: heights in the document become triangles, a raster file becomes a `ReliefGrid`.
 
-use map3d_base::Result;
+use map3d_base::{Reason, Result};
 
 use super::city_object_parser::CityObjectParser;
 use super::coordinates::parse_numbers;
@@ -13,9 +13,8 @@ use crate::city_model::crs_table::{CrsNumber, TOO_MANY};
 use crate::city_model::geometry_arena::{GeometryNode, NO_NODE, NodeId, NodeKind, Ring};
 use crate::city_model::ids;
 use crate::document::ReliefGrid;
+use crate::document::asset_folder::RELIEF;
 
-const TOO_MANY_HEIGHTS: &str = "RasterRelief: too many heights in the document";
-const GAP: &str = "grid points without a height";
 /// Greater absolute heights count as gaps.
 const MAX_HEIGHT_M: f64 = 100_000.0;
 
@@ -59,20 +58,20 @@ impl GridPlace {
 
 impl WrittenGrid {
     /// Returns the place of the values, or why the grid is unusable.
-    fn place(&self) -> std::result::Result<GridPlace, &'static str> {
+    fn place(&self) -> std::result::Result<GridPlace, Reason> {
         if self.is_plain {
-            return Err("RasterRelief: grid without a place in the world");
+            return Err(Reason::ReliefGridWithoutPlace);
         }
         let [low, high] = [&self.low, &self.high].map(|v| v.first_chunk::<2>().copied().filter(|v| v.iter().all(|v| v.fract() == 0.0)));
         let vectors: Vec<[f64; 2]> = self.vectors.iter().filter_map(|v| v.first_chunk::<2>().copied()).collect();
         let (Some(low), Some(high), Some(origin), [u, v]) = (low, high, self.origin.first_chunk::<2>(), &*vectors) else {
-            return Err("RasterRelief: grid without limits, origin or two offset vectors");
+            return Err(Reason::ReliefGridIncomplete);
         };
         let counts: [f64; 2] = std::array::from_fn(|k| high[k] - low[k] + 1.0);
         if !counts.iter().all(|n| (2.0..=4e9).contains(n)) {
-            return Err("RasterRelief: grid with fewer than 2 × 2 points");
+            return Err(Reason::ReliefGridTooSmall);
         }
-        let [fast, slow] = self.order.axes(&self.labels).ok_or("RasterRelief: order of values that map3d does not read")?;
+        let [fast, slow] = self.order.axes(&self.labels).ok_or(Reason::ReliefGridOrderNotRead)?;
         let start: [f64; 2] = std::array::from_fn(|axis| {
             let descends = [fast, slow].iter().any(|along| along.axis == axis && along.descends);
             if descends { high[axis] } else { low[axis] }
@@ -88,7 +87,7 @@ impl WrittenGrid {
         let is_finite = place.first.iter().chain(&place.column_step).chain(&place.row_step).all(|v| v.is_finite());
         match is_finite && place.cell_area() != 0.0 && place.cell_area().is_finite() {
             true => Ok(place),
-            false => Err("RasterRelief: offset vectors that span no area"),
+            false => Err(Reason::ReliefGridWithoutArea),
         }
     }
 }
@@ -98,16 +97,16 @@ impl CityObjectParser<'_> {
     pub fn read_grid(&mut self, number: u32) -> Result<()> {
         let at = self.xml.position();
         if let Some(href) = self.xml.attribute("href").map(|href| href.into_owned()) {
-            self.report.warn("RasterRelief: grid in another place, not followed", href)?;
+            self.report.warn(Reason::ReliefGridElsewhere, href)?;
         }
         let grid = self.read_written_grid()?;
         let location = || format!("before byte {at}");
         let place = match (grid.place(), &grid.values) {
-            (_, GridValues::None) => return self.report.skip("RasterRelief: grid without heights", location),
-            (_, GridValues::TooMany) => return self.report.skip(TOO_MANY_HEIGHTS, location),
+            (_, GridValues::None) => return self.report.skip(Reason::ReliefGridWithoutHeights, location),
+            (_, GridValues::TooMany) => return self.report.skip(Reason::ReliefGridWithTooManyHeights, location),
             (Err(reason), _) => return self.report.skip(reason, location),
             (Ok(_), _) if grid.crs == Some(TOO_MANY) => {
-                return self.report.skip("RasterRelief: grid in one of too many coordinate systems", location);
+                return self.report.skip(Reason::ReliefGridCrsTooMany, location);
             }
             (Ok(place), _) => place,
         };
@@ -118,7 +117,7 @@ impl CityObjectParser<'_> {
             GridValues::Inline(heights) if heights.len() as u64 == place.columns * place.rows => self.add_heights(number, place, crs, &heights),
             GridValues::Inline(heights) => {
                 let (got, columns, rows) = (heights.len(), place.columns, place.rows);
-                self.report.skip("RasterRelief: number of heights that does not fit the grid", || format!("{got} for {columns} × {rows}"))
+                self.report.skip(Reason::ReliefGridHeightsDoNotFit, || format!("{got} for {columns} × {rows}"))
             }
         }
     }
@@ -184,7 +183,7 @@ impl CityObjectParser<'_> {
     fn add_raster(&mut self, number: u32, place: GridPlace, crs: CrsNumber, name: String) -> Result<()> {
         let file = match self.folder.find(&name) {
             Ok(file) => file,
-            Err(error) => return self.report.skip(&format!("RasterRelief: {}", error.reason()), || name),
+            Err(error) => return self.report.skip(error.reason(RELIEF), || name),
         };
         if let Some(oddity) = file.oddity {
             self.report.note(oddity, name.as_str());
@@ -197,7 +196,7 @@ impl CityObjectParser<'_> {
         let has_extent = self.city_object.features[number as usize].extent.is_some();
         self.city_object.grids.push(ReliefGrid { object, file: file.path, columns, rows, first, column_step, row_step, crs });
         if has_extent {
-            self.report.note("RasterRelief: extent not applied to its raster", name);
+            self.report.note(Reason::ReliefExtentNotApplied, name);
         }
         self.city_object.features[number as usize].representations.push(LodRepresentation { lod, representation: Representation::Raster(index) });
         Ok(())
@@ -213,10 +212,10 @@ impl CityObjectParser<'_> {
         let (got, value) = ((place.columns - 1) * (place.rows - 1) * BYTES + self.city_object.geometry.byte_count(), self.options.max_object_bytes);
         if got > value {
             let (columns, rows) = (place.columns, place.rows);
-            return self.report.skip(TOO_MANY_HEIGHTS, || format!("{columns} × {rows}"));
+            return self.report.skip(Reason::ReliefGridWithTooManyHeights, || format!("{columns} × {rows}"));
         }
         let is_gap = |height: &f64| !height.is_finite() || height.abs() > MAX_HEIGHT_M;
-        self.report.omit(GAP, heights.iter().filter(|height| is_gap(height)).count() as u64);
+        self.report.omit(Reason::GridPointsWithoutHeight, heights.iter().filter(|height| is_gap(height)).count() as u64);
         let extent = self.city_object.features[number as usize].extent.map(|nodes| ReliefExtent::new(&self.city_object.geometry, nodes));
         let group = self.city_object.geometry.add(ids::NONE, NO_NODE, NodeKind::Group);
         let mut outside = 0;
@@ -236,7 +235,7 @@ impl CityObjectParser<'_> {
                 }
             }
         }
-        self.report.omit("RasterRelief: triangle outside the extent", outside);
+        self.report.omit(Reason::ReliefTriangleOutsideExtent, outside);
         let lod = self.relief_lod(number);
         let representation = Representation::Surfaces(group);
         self.city_object.features[number as usize].representations.push(LodRepresentation { lod, representation });

@@ -1,6 +1,6 @@
 //! Parses implicit geometry.
 
-use map3d_base::Result;
+use map3d_base::{Reason, Result};
 
 use super::city_object_parser::CityObjectParser;
 use super::coordinates::parse_numbers;
@@ -13,7 +13,7 @@ const IDENTITY: Transform = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1
 
 impl CityObjectParser<'_> {
     /// Reads the current ImplicitGeometry element. The inner error is the reason why it cannot be placed. `crs`: of the feature that has it.
-    pub fn read_implicit_geometry(&mut self, crs: CrsNumber) -> Result<std::result::Result<ImplicitGeometry, &'static str>> {
+    pub fn read_implicit_geometry(&mut self, crs: CrsNumber) -> Result<std::result::Result<ImplicitGeometry, Reason>> {
         let (mut node, mut library_object, mut matrix, mut reference) = (None, None, Some(IDENTITY), None);
         while self.xml.next_child()? {
             match self.xml.local_name() {
@@ -28,20 +28,20 @@ impl CityObjectParser<'_> {
                 _ => self.xml.skip()?,
             }
         }
-        let Some(mut transform) = matrix else { return Ok(Err("implicit geometry with an invalid transformation matrix")) };
-        let Some(NamedPoint { point: reference, srs_name }) = reference else { return Ok(Err("implicit geometry without a reference point")) };
+        let Some(mut transform) = matrix else { return Ok(Err(Reason::ImplicitGeometryMatrixInvalid)) };
+        let Some(NamedPoint { point: reference, srs_name }) = reference else { return Ok(Err(Reason::ImplicitGeometryWithoutReferencePoint)) };
         let crs = srs_name.and_then(|name| self.crs_table.find(&name)).unwrap_or(crs);
         if crs == TOO_MANY {
-            return Ok(Err("implicit geometry in one of too many coordinate systems"));
+            return Ok(Err(Reason::ImplicitGeometryCrsTooMany));
         }
         (0..3).for_each(|k| transform[4 * k + 3] += reference[k]);
         if !transform.iter().all(|v| v.is_finite()) {
-            return Ok(Err("implicit geometry with an invalid transformation matrix"));
+            return Ok(Err(Reason::ImplicitGeometryMatrixInvalid));
         }
         let prototype = match (node, library_object) {
             (Some(node), _) => PrototypeSource::Geometry(node),
             (None, Some(name)) => PrototypeSource::Library(name),
-            (None, None) => return Ok(Err("implicit geometry without a prototype")),
+            (None, None) => return Ok(Err(Reason::ImplicitGeometryWithoutPrototype)),
         };
         Ok(Ok(ImplicitGeometry { prototype, transform, crs }))
     }

@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use map3d_base::{Error, Result};
+use map3d_base::{Error, Reason, Result};
 
 use super::appearance_parser::{AppearanceParser, AppearanceScope};
 use super::geometry_parser::{GeometryParser, is_surface};
@@ -24,12 +24,6 @@ use crate::document::text_input::open_xml;
 const MAX_CHAIN: usize = 16;
 /// Bytes of other documents that are read for one document.
 const MAX_BYTES: u64 = 1 << 30;
-
-const NO_SUCH_GEOMETRY: &str = "reference into another file: no geometry with this id";
-const NO_SUCH_SURFACE: &str = "appearance in another file: no surface with this id";
-const CHAIN_TOO_LONG: &str = "reference into another file: chain of more than 16 references";
-const TOO_MANY_BYTES: &str = "reference into another file: more than 1 GiB of other files";
-const NOT_READ_TO_END: &str = "another file that this one refers to is broken or too large; what was read of it is kept";
 
 pub struct OtherDocuments<'a> {
     pub references: &'a mut References,
@@ -63,7 +57,7 @@ impl OtherDocuments<'_> {
             }
         }
         for (_, wanted) in self.references.take_wanted() {
-            self.references.fail(wanted, CHAIN_TOO_LONG);
+            self.references.fail(wanted, Reason::OtherFileChainTooLong);
         }
         add_own_appearances(self.geometry, self.appearances);
         self.appearances.resolve_theme_xlinks();
@@ -71,12 +65,12 @@ impl OtherDocuments<'_> {
     }
 
     /// Reads wanted geometry. Returns the reason for what is not there.
-    fn read_geometry(&mut self, document: DocumentNumber, wanted: &WantedElements, progress: &mut Progress) -> Result<&'static str> {
+    fn read_geometry(&mut self, document: DocumentNumber, wanted: &WantedElements, progress: &mut Progress) -> Result<Reason> {
         if progress.bytes < MAX_BYTES {
             let scope = progress.appearances.insert(document).then_some(AppearanceScope::Document);
             progress.bytes += self.read_document(document, wanted, scope, MAX_BYTES - progress.bytes)?;
         }
-        Ok(if progress.bytes < MAX_BYTES { NO_SUCH_GEOMETRY } else { TOO_MANY_BYTES })
+        Ok(if progress.bytes < MAX_BYTES { Reason::OtherFileWithoutGeometry } else { Reason::OtherFilesTooLarge })
     }
 
     /// Reads the appearances of other documents that target surfaces of the document. Reports the surfaces that are not there.
@@ -89,7 +83,7 @@ impl OtherDocuments<'_> {
         let missing = self.find_missing_targets(&path).map_err(|e| Error::storage(&path, e))?;
         let mut missing: Vec<String> = missing.into_values().collect();
         missing.sort_unstable();
-        missing.into_iter().try_for_each(|href| self.report.warn(NO_SUCH_SURFACE, href))
+        missing.into_iter().try_for_each(|href| self.report.warn(Reason::AppearanceTargetNotFound, href))
     }
 
     /// Reads one document to its end or up to `max_bytes`; returns the number of bytes read. A broken one is reported.
@@ -110,7 +104,7 @@ impl OtherDocuments<'_> {
         self.references.enter(outer);
         match read {
             Err(error) if self.options.strict => return Err(error),
-            Err(error) => self.report.note_file(NOT_READ_TO_END, format!("{}: {error}", self.references.file_name(document))),
+            Err(error) => self.report.note(Reason::OtherFileBroken, format!("{}: {error}", self.references.file_name(document))),
             Ok(()) => {}
         }
         Ok(bytes)

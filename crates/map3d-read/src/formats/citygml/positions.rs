@@ -2,7 +2,7 @@
 
 use std::io::BufRead;
 
-use map3d_base::{Result, Vec3};
+use map3d_base::{Reason, Result, Vec3};
 
 use super::coordinates::parse_points;
 use super::xml_reader::{XmlEvent, XmlReader};
@@ -52,11 +52,11 @@ impl PositionsRead {
     }
 
     /// Returns why the polygon has no triangles.
-    pub fn fault(&self) -> Option<&'static str> {
+    pub fn fault(&self) -> Option<Reason> {
         match self {
-            Self { valid: false, .. } => Some("polygon with unreadable coordinates"),
-            Self { is_mixed: true, .. } => Some("polygon in more than one coordinate system"),
-            Self { crs: Some(TOO_MANY), .. } => Some("polygon in one of too many coordinate systems"),
+            Self { valid: false, .. } => Some(Reason::PolygonCoordinatesUnreadable),
+            Self { is_mixed: true, .. } => Some(Reason::PolygonInSeveralCrs),
+            Self { crs: Some(TOO_MANY), .. } => Some(Reason::PolygonCrsTooMany),
             _ => None,
         }
     }

@@ -6,7 +6,7 @@
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-use map3d_base::{Error, Result};
+use map3d_base::{Error, Reason, Result};
 
 use super::appearance_parser::{AppearanceParser, AppearanceScope, parse_transparency};
 use super::options::CityGmlOptions;
@@ -49,7 +49,7 @@ impl PreScan {
         let mut scan = Self { theme: ThemeSelection::new(of_format.theme.clone()), ..Self::default() };
         let (input, faults) = open_checked_xml(path)?;
         for EncodingFault { reason, example } in faults {
-            report.warn_file(reason, example)?;
+            report.warn(reason, example)?;
         }
         let mut scanner = TagScanner::new(input);
         let mut links = ObjectReferences::default();
@@ -96,7 +96,7 @@ impl PreScan {
         scan.theme.choose();
         scan.appearances.count_transparency(&mut scan.transparency);
         for other in scan.appearances.resolve_pending(scan.theme.selected()) {
-            report.note("appearance of another theme ignored", other);
+            report.note(Reason::AppearanceOfOtherTheme, other);
         }
         scan.appearances.resolve_theme_xlinks();
         Ok(scan)

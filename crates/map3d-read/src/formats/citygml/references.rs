@@ -6,11 +6,11 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-use map3d_base::Result;
+use map3d_base::{Reason, Result};
 
 use crate::city_model::ids::{Id, IdMap, IdSet, hash_id, mix_id};
 use crate::city_model::shared_geometry::MissingGeometry;
-use crate::document::asset_folder::{AssetFolder, FileError};
+use crate::document::asset_folder::{AssetFolder, OTHER_FILE};
 
 /// Index of a document in `References`.
 pub type DocumentNumber = usize;
@@ -25,9 +25,6 @@ const MAX_WANTED: usize = 1_000_000;
 const MAX_REFERENCE_CHARS: usize = 200;
 /// Of a name that is kept; a longer one is no name of a file.
 const MAX_NAME_BYTES: usize = 1024;
-
-const NO_SUCH_FILE: &str = "reference into another file: file not found";
-const TOO_MANY: &str = "reference into another file: too many references";
 
 /// A document, and its ids in those of `References`.
 struct Document {
@@ -51,7 +48,7 @@ pub struct References {
     root: Option<PathBuf>,
     documents: Vec<Document>,
     /// Documents by the name that another one uses; `Err` for a name that leads to none.
-    by_name: HashMap<(DocumentNumber, String), std::result::Result<DocumentNumber, &'static str>>,
+    by_name: HashMap<(DocumentNumber, String), std::result::Result<DocumentNumber, Reason>>,
     /// Number of a second reading of the document itself, for other documents that refer back to it.
     own_copy: Option<DocumentNumber>,
     /// The document whose references are resolved.
@@ -89,19 +86,19 @@ impl References {
     }
 
     /// Resolves a reference of the current document. The error is the reason why it leads nowhere.
-    pub fn resolve(&mut self, href: &str) -> std::result::Result<Target, &'static str> {
+    pub fn resolve(&mut self, href: &str) -> std::result::Result<Target, Reason> {
         self.resolve_within(href, self.current)
     }
 
     /// Resolves a reference of the current document; one without a file name is into `document`.
-    pub fn resolve_within(&mut self, href: &str, document: DocumentNumber) -> std::result::Result<Target, &'static str> {
+    pub fn resolve_within(&mut self, href: &str, document: DocumentNumber) -> std::result::Result<Target, Reason> {
         let (file, id) = split_reference(href);
         let document = if file.is_empty() { document } else { self.find_document(file)? };
         Ok(Target { id: mix_id(hash_id(id), self.documents[document].key), document })
     }
 
     /// Resolves a reference to geometry. That of another document is read later.
-    pub fn resolve_geometry(&mut self, href: &str) -> std::result::Result<Id, &'static str> {
+    pub fn resolve_geometry(&mut self, href: &str) -> std::result::Result<Id, Reason> {
         let target = self.resolve(href)?;
         if self.current == OWN_DOCUMENT && target.document == OWN_DOCUMENT {
             return Ok(target.id);
@@ -109,7 +106,7 @@ impl References {
         let Target { id, document } = if target.document == OWN_DOCUMENT { self.in_own_copy(target.id)? } else { target };
         if !self.requested.contains(&id) {
             if self.requested.len() >= MAX_WANTED {
-                return Err(TOO_MANY);
+                return Err(Reason::OtherFileReferencesTooMany);
             }
             self.requested.insert(id);
             let reference = self.describe(href);
@@ -184,7 +181,7 @@ impl References {
     }
 
     /// Records why geometry is not there.
-    pub fn fail(&mut self, wanted: WantedElements, reason: &'static str) {
+    pub fn fail(&mut self, wanted: WantedElements, reason: Reason) {
         self.missing.extend(wanted.into_iter().map(|(id, href)| (id, (reason, href))));
     }
 
@@ -193,20 +190,20 @@ impl References {
         &self.missing
     }
 
-    fn find_document(&mut self, name: &str) -> std::result::Result<DocumentNumber, &'static str> {
+    fn find_document(&mut self, name: &str) -> std::result::Result<DocumentNumber, Reason> {
         let key = (self.current, name.to_owned());
         if let Some(found) = self.by_name.get(&key) {
             return *found;
         }
         let file = self.documents[self.current].folder.find(name);
-        let found = file.map_err(explain).and_then(|file| self.number_of(&file.path));
+        let found = file.map_err(|error| error.reason(OTHER_FILE)).and_then(|file| self.number_of(&file.path));
         if self.by_name.len() < MAX_NAMES && name.len() <= MAX_NAME_BYTES {
             self.by_name.insert(key, found);
         }
         found
     }
 
-    fn number_of(&mut self, path: &Path) -> std::result::Result<DocumentNumber, &'static str> {
+    fn number_of(&mut self, path: &Path) -> std::result::Result<DocumentNumber, Reason> {
         match self.documents.iter().position(|document| document.path == path) {
             Some(number) => Ok(number),
             None => self.push_document(path),
@@ -214,7 +211,7 @@ impl References {
     }
 
     /// Returns the element with this id of the document itself in its second reading.
-    fn in_own_copy(&mut self, id: Id) -> std::result::Result<Target, &'static str> {
+    fn in_own_copy(&mut self, id: Id) -> std::result::Result<Target, Reason> {
         let document = match self.own_copy {
             Some(number) => number,
             None => self.push_document(&self.documents[OWN_DOCUMENT].path.clone())?,
@@ -223,13 +220,13 @@ impl References {
         Ok(Target { id: mix_id(id, self.documents[document].key), document })
     }
 
-    fn push_document(&mut self, path: &Path) -> std::result::Result<DocumentNumber, &'static str> {
+    fn push_document(&mut self, path: &Path) -> std::result::Result<DocumentNumber, Reason> {
         if self.documents.len() >= MAX_DOCUMENTS {
-            return Err(TOO_MANY);
+            return Err(Reason::OtherFileReferencesTooMany);
         }
         // References of the document itself stay inside its own folder without a root; so do those of the documents that it refers to.
         let root = self.root.as_deref().or(self.documents[OWN_DOCUMENT].path.parent());
-        let folder = AssetFolder::for_document(path, root).map_err(|_| NO_SUCH_FILE)?;
+        let folder = AssetFolder::for_document(path, root).map_err(|_| Reason::OtherFileNotFound)?;
         let number = self.documents.len();
         self.documents.push(Document { path: path.to_path_buf(), key: hash_id(&format!("document {number}")), folder });
         Ok(number)
@@ -251,17 +248,6 @@ fn split_reference(href: &str) -> (&str, &str) {
         Some((file, id)) => (file.trim(), id),
         None if href.contains("://") => (href, ""),
         None => ("", href),
-    }
-}
-
-/// Returns the reason as written to reports.
-fn explain(error: FileError) -> &'static str {
-    match error {
-        FileError::NotFound => NO_SUCH_FILE,
-        FileError::OutsideFolder => "reference into another file: file outside the given folder not read",
-        FileError::Url => "reference into another file: URL not fetched",
-        FileError::NotAFile => "reference into another file: not a regular file",
-        FileError::InvalidName => "reference into another file: invalid file name",
     }
 }
 

@@ -1,6 +1,6 @@
 //! Parses a `gml:Tin` that has no triangles but control points, break lines and stop lines, and triangulates it.
 
-use map3d_base::{Result, Vec3};
+use map3d_base::{Reason, Result, Vec3};
 
 use super::geometry_parser::GeometryParser;
 use super::positions::PositionFormat;
@@ -58,7 +58,7 @@ impl GeometryParser<'_> {
         let length = text.parse::<f64>().ok().zip(unit.or(Some(1.0))).map(|(length, metres)| length * metres);
         let length = length.filter(|length| length.is_finite() && *length > 0.0);
         if length.is_none() {
-            self.report.warn("Tin: maxLength that is not a length", text)?;
+            self.report.warn(Reason::TinMaxLengthInvalid, text)?;
         }
         Ok(length)
     }
@@ -66,7 +66,7 @@ impl GeometryParser<'_> {
     /// Adds the triangles of a Tin that has none of its own, or skips and counts it.
     pub fn add_tin(&mut self, node: NodeId, tin: TinParts) -> Result<()> {
         if self.geometry.node(node).first_child != NO_NODE {
-            self.report.omit("points and lines", (tin.break_lines.len() + tin.stop_lines.len()) as u64);
+            self.report.omit(Reason::PointsAndLines, (tin.break_lines.len() + tin.stop_lines.len()) as u64);
             return Ok(());
         }
         let at = self.xml.position();
@@ -76,7 +76,7 @@ impl GeometryParser<'_> {
         }
         let crs = tin.read.crs.unwrap_or(DOCUMENT_CRS);
         let prepared = PreparedTin::new(&tin, estimate_metres_per_unit(self.crs_table.names()[crs as usize].as_deref()));
-        self.report.skip_many("Tin: point whose coordinates are not finite numbers", prepared.not_finite, location)?;
+        self.report.skip_many(Reason::TinPointNotFinite, prepared.not_finite, location)?;
         match triangulate_tin(&prepared.source) {
             Err(error) => self.report.skip(error.reason(), location),
             Ok(triangles) => {
@@ -91,11 +91,11 @@ impl GeometryParser<'_> {
         let at = self.xml.position();
         let location = || format!("before byte {at}");
         if tin.other_heights > 0 {
-            self.report.warn("Tin: points in one place with different heights", format!("{}, {}", tin.other_heights, location()))?;
+            self.report.warn(Reason::TinHeightsDiffer, format!("{}, {}", tin.other_heights, location()))?;
         }
-        self.report.skip_many("Tin: break line that crosses another one", tin.crossing_breaks, location)?;
-        self.report.omit("Tin: triangle at a stop line", tin.stopped);
-        self.report.omit("Tin: triangle with a side over maxLength", tin.too_long);
+        self.report.skip_many(Reason::TinBreakLinesCross, tin.crossing_breaks, location)?;
+        self.report.omit(Reason::TinTriangleAtStopLine, tin.stopped);
+        self.report.omit(Reason::TinTriangleTooLong, tin.too_long);
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! Resolves `usemtl` names to entries of the material table and texture coordinate transformations.
 
-use map3d_base::Result;
 use map3d_base::asset::{Material, Wrap};
+use map3d_base::{Reason, Result};
 
 use super::mtl::{MaterialLibrary, MtlMaterial};
 use crate::document::asset_folder::AssetFolder;
@@ -48,7 +48,7 @@ impl FaceMaterialResolver {
             if let Some(definition) = self.library.get(name).cloned() {
                 return self.resolve_definition(name, &definition, options, report);
             }
-            report.warn("material not defined", name)?;
+            report.warn(Reason::MaterialNotDefined, name)?;
         }
         Ok(FaceMaterial::untextured(self.table.add(Material::default()), true))
     }
@@ -67,7 +67,7 @@ impl FaceMaterialResolver {
         resolved.invisible = opacity <= 0.0;
         let Some(map) = &definition.color_map else {
             if let Some(map) = &definition.opacity_map {
-                report.note("map_d without map_Kd ignored", map.name.as_str());
+                report.note(Reason::AlphaMapIgnored, map.name.as_str());
             }
             return Ok(resolved);
         };
@@ -117,7 +117,7 @@ fn choose_tint(diffuse: Option<[f32; 3]>, name: &str, report: &mut ReportBuilder
     match diffuse {
         None => [1.0; 3],
         Some([0.0, 0.0, 0.0]) => {
-            report.note("black Kd with map_Kd treated as white", name);
+            report.note(Reason::BlackMaterialWithTexture, name);
             [1.0; 3]
         }
         Some(color) => color,

@@ -4,10 +4,10 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::path::Path;
 
-use map3d_base::Result;
+use map3d_base::{Reason, Result};
 
 use super::line_reader::{LineReader, numbers, parse_number, split_word};
-use crate::document::asset_folder::AssetFolder;
+use crate::document::asset_folder::{AssetFolder, MATERIAL_LIBRARY};
 use crate::document::report_builder::ReportBuilder;
 use crate::document::text_input::decode_name;
 use crate::document::transparency::{Transparency, TransparencyCounts};
@@ -53,7 +53,7 @@ impl MaterialLibrary {
     pub fn load_statement(&mut self, rest: &[u8], folder: &mut AssetFolder, report: &mut ReportBuilder) -> Result<()> {
         let whole = decode_name(rest).trim_matches('"').to_owned();
         if whole.is_empty() {
-            return report.warn("mtllib without a file name", String::new());
+            return report.warn(Reason::MaterialLibraryUnnamed, String::new());
         }
         if folder.find(&whole).is_ok() || !whole.contains(char::is_whitespace) {
             return self.load_named(&whole, folder, report);
@@ -75,7 +75,7 @@ impl MaterialLibrary {
                 let prefix = slashed.rsplit_once('/').map_or("", |(prefix, _)| prefix);
                 self.load(&file.path, prefix, folder, report)
             }
-            Err(error) => report.warn(&format!("material library: {}", error.reason()), name),
+            Err(error) => report.warn(error.reason(MATERIAL_LIBRARY), name),
         }
     }
 
@@ -108,7 +108,7 @@ impl MaterialLibrary {
 
     fn add(&mut self, name: String, material: MtlMaterial, report: &mut ReportBuilder) {
         match self.materials.entry(name) {
-            Entry::Occupied(first) => report.note("material defined more than once; using the first", first.key().as_str()),
+            Entry::Occupied(first) => report.note(Reason::MaterialDefinedTwice, first.key().as_str()),
             Entry::Vacant(slot) => {
                 slot.insert(material);
             }

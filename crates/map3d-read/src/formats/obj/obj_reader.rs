@@ -5,7 +5,7 @@ use std::path::Path;
 
 use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object};
 use map3d_base::vec3::normalized;
-use map3d_base::{Result, Vec3};
+use map3d_base::{Reason, Result, Vec3};
 
 use super::batch_builder::{BatchBuilder, FaceTriangle};
 use super::face::{ElementCounts, FaceVertex, parse_face};
@@ -23,8 +23,6 @@ use crate::document::transparency::report_invisible;
 use crate::triangulation::triangulate::{Coverage, Triangulator};
 
 pub const NAME: &str = "obj";
-/// The reason for faces left out.
-const INVISIBLE_FACE: &str = "fully transparent face";
 const BATCH_TRIANGLES: usize = 1 << 16;
 /// Colour of a vertex without a colour, in a document that has vertex colours.
 const DEFAULT_VERTEX_COLOR: [u8; 3] = [204; 3];
@@ -117,7 +115,7 @@ impl ObjReader {
             }
             b"f" | b"fo" => match parse_face(rest, counts, &mut self.face) {
                 Some(()) => self.add_face()?,
-                None => self.skip("unreadable face")?,
+                None => self.skip(Reason::FaceUnreadable)?,
             },
             b"usemtl" => {
                 self.material_name = Some(decode_name(rest).into_owned()).filter(|name| !name.is_empty());
@@ -125,14 +123,14 @@ impl ObjReader {
             }
             b"mtllib" => self.materials.library.load_statement(rest, &mut self.materials.folder, &mut self.report)?,
             b"o" | b"g" => self.group = decode_name(rest).into_owned(),
-            b"p" | b"l" => self.report.omit("points and lines", 1),
-            b"curv" | b"surf" | b"curv2" => self.skip("free-form curve or surface")?,
+            b"p" | b"l" => self.report.omit(Reason::PointsAndLines, 1),
+            b"curv" | b"surf" | b"curv2" => self.skip(Reason::FreeFormGeometry)?,
             _ => {}
         }
         Ok(true)
     }
 
-    fn skip(&mut self, reason: &str) -> Result<()> {
+    fn skip(&mut self, reason: Reason) -> Result<()> {
         let line = self.lines.line_number;
         self.report.skip(reason, || format!("line {line}"))
     }
@@ -142,7 +140,7 @@ impl ObjReader {
         let position = match *values {
             [x, y, z, ..] => convert_to_z_up([x, y, z], self.of_format.up),
             _ => {
-                self.skip("unreadable vertex")?;
+                self.skip(Reason::VertexUnreadable)?;
                 [f64::NAN; 3]
             }
         };
@@ -179,11 +177,11 @@ impl ObjReader {
         let (uvs, normals) = (self.uvs.len(), self.normals.len());
         if self.face.iter().any(|v| !is_below(v.uv, uvs)) {
             self.face.iter_mut().for_each(|v| v.uv = None);
-            self.report.warn("texture index out of range: face without texture", format!("line {line}"))?;
+            self.report.warn(Reason::TextureIndexOutOfRange, format!("line {line}"))?;
         }
         if self.face.iter().any(|v| !is_below(v.normal, normals)) {
             self.face.iter_mut().for_each(|v| v.normal = None);
-            self.report.warn("normal index out of range: face without normals", format!("line {line}"))?;
+            self.report.warn(Reason::NormalIndexOutOfRange, format!("line {line}"))?;
         }
         Ok(())
     }
@@ -212,20 +210,20 @@ impl ObjReader {
         self.drop_repeated_vertices();
         let limit = self.options.max_ring_vertices;
         if self.face.len() as u64 > limit {
-            return self.report.skip(&format!("face over the limit max_ring_vertices = {limit}"), location);
+            return self.report.skip(Reason::FaceOverLimit.with("limit", limit), location);
         }
         if self.face.len() < 3 {
-            return self.report.skip("face with fewer than 3 vertices", location);
+            return self.report.skip(Reason::FaceWithTooFewVertices, location);
         }
         if material.invisible {
-            self.report.omit(INVISIBLE_FACE, 1);
+            self.report.omit(Reason::FaceTransparent, 1);
             return Ok(());
         }
         self.ring.clear();
         self.ring.extend(self.face.iter().map(|v| self.positions[v.position as usize]));
         match self.triangulator.triangulate(&self.ring, &[self.ring.len()]) {
             Err(error) => return self.report.skip(error.reason(), location),
-            Ok(Coverage::Inexact) => self.report.warn("self-intersecting face", location())?,
+            Ok(Coverage::Inexact) => self.report.warn(Reason::FaceEdgesCross, location())?,
             Ok(Coverage::Exact) => {}
         }
         self.push_triangles(material, object)
@@ -266,7 +264,7 @@ impl ObjReader {
     fn triangulate_deferred(&mut self) -> Result<()> {
         for face in std::mem::take(&mut self.deferred) {
             if !face.vertices.iter().all(|v| (v.position as usize) < self.positions.len()) {
-                self.report.skip("index out of range", || format!("line {}", face.line))?;
+                self.report.skip(Reason::IndexOutOfRange, || format!("line {}", face.line))?;
                 continue;
             }
             self.face = face.vertices;
@@ -294,7 +292,7 @@ impl DocumentReader for ObjReader {
             if !self.read_line()? {
                 self.at_end = true;
                 self.triangulate_deferred()?;
-                report_invisible(self.report.skipped(INVISIBLE_FACE), self.materials.library.has_inverted, &mut self.report);
+                report_invisible(self.report.count(Reason::FaceTransparent), self.materials.library.has_inverted, &mut self.report);
             }
         }
         Ok((self.batch.triangle_count() > 0).then(|| self.batch.take()))

@@ -1,0 +1,1 @@
+"""Renders on the workers of a Dask cluster."""

@@ -1,0 +1,1 @@
+"""Previews: small pictures and estimates of a view before its rendering exists."""

@@ -1,0 +1,1 @@
+"""Site: a folder of files becomes a scene and a rendering, with a report."""

@@ -1,0 +1,1 @@
+"""What all routes use: access, cookies, settings, statuses, compression, caches, public URLs, health, open tile stores."""

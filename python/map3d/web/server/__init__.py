@@ -1,0 +1,1 @@
+"""Runs the app: composes all routes, reads bodies, measures, logs and answers errors."""

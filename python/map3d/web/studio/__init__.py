@@ -1,0 +1,1 @@
+"""The pages of the studio: scenes, files, renderings, operations, accounts."""

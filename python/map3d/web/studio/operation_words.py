@@ -1,0 +1,54 @@
+"""Operations as pages show them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from map3d.catalogue import OperationRecord
+from map3d.catalogue.operation_records import REPEATABLE, UNENDED
+from map3d.web.http.host_folders import without_host_folders
+from map3d.web.pages.tools import translate as _
+from map3d.web.studio.operation_sentences import operation_text
+
+N_: Final = str
+KINDS: Final = {"import": N_("Import"), "build": N_("Build"), "render": N_("Render"), "publish": N_("Publish"), "remove": N_("Remove")}
+STATES: Final = {"waiting": N_("Waiting"), "running": N_("Running"), "done": N_("Done"), "failed": N_("Failed"), "cancelled": N_("Cancelled")}
+
+
+@dataclass(frozen=True)
+class ShownOperation:
+    """`percent`: None while it is unknown."""
+
+    id: str
+    title: str
+    state: str
+    state_text: str
+    text: str
+    percent: int | None
+    record: OperationRecord
+
+    @property
+    def is_open(self) -> bool:
+        return self.record.state in UNENDED
+
+    @property
+    def lacks_crs(self) -> bool:
+        """Whether an import failed because its files do not name their coordinate system."""
+        return self.record.kind == "import" and self.can_retry and "--crs" in self.record.message and bool(self.record.arguments.get("files"))
+
+    @property
+    def can_retry(self) -> bool:
+        return self.record.state in REPEATABLE
+
+
+def show(operation: OperationRecord) -> ShownOperation:
+    state = str(operation.state)
+    state_text = _("Stopping") if operation.cancelling else _(STATES[state])
+    percent = min(100, 100 * operation.done // operation.total) if operation.total and state == "running" else None
+    said = operation.stage if state == "running" else operation.message
+    text = _("Starts when a worker is free.") if state == "waiting" else operation_text(without_host_folders(said))
+    return ShownOperation(operation.id, f"{_(KINDS[operation.kind])}: {operation.target}", state, state_text, text, percent, operation)
+
+
+def show_all(operations: Iterable[OperationRecord]) -> list[ShownOperation]:
+    return [show(operation) for operation in operations]

@@ -1,0 +1,1 @@
+"""Routes of a rendering: tiles, manifest, attribute documents and pictures."""

@@ -1,0 +1,1 @@
+"""The upload route (tus protocol)."""

@@ -1,0 +1,91 @@
+"""Messages have texts in all languages, with the same values; what an older version stored stays as it is."""
+
+import json
+from pathlib import Path
+from string import Formatter
+
+import pytest
+
+from map3d.ingest.findings import findings, report_document, skipped_count, sum_findings, warning_count
+from map3d.messages import FORMATS, Message, load_message, message, table, verbatim
+from tests.web.test_page_formats import NARROW
+
+SEVERITIES = {"error", "warning", "note", "skipped", "omitted", "progress", "done"}
+
+
+def fields(text):
+    return sorted((name, spec) for _, name, spec, _ in Formatter().parse(text) if name is not None)
+
+
+def test_the_core_carries_the_specification():
+    assert table() == json.loads((Path(__file__).parents[1] / "spec" / "messages.json").read_text("utf-8"))
+
+
+@pytest.mark.parametrize("language", ["de", "fr"])
+def test_every_text_is_in_every_language_with_the_same_values(language):
+    for code, row in table().items():
+        assert set(row) - {"whole_file"} == {"severity", "en", "de", "fr"}, code
+        assert row["severity"] in SEVERITIES, code
+        one, other = ([row[name]] if isinstance(row[name], str) else row[name] for name in ("en", language))
+        assert [fields(text) for text in one] == [fields(text) for text in other], code
+        assert all(spec in ("", *FORMATS, *table()) for text in one for _, spec in fields(text)), code
+
+
+def test_a_text_has_the_values_as_its_language_writes_them():
+    found = message("ring-over-limit", limit=200_000, count=1_234)
+    assert str(found) == "Skipped rings with more than 200,000 points: 1,234."
+    assert found.text("de") == "Übersprungene Ringe mit mehr als 200.000 Punkten: 1.234."
+    assert f"200{NARROW}000" in found.text("fr")
+    assert message("finding", finding=found, example="b").text("de").endswith("1.234. Beispiel: b")
+
+
+def test_the_count_chooses_the_text():
+    one, other = (message("document-broken", count=count) for count in (1, 2))
+    assert (str(one), str(other)) == ("The file breaks off; what comes before is kept.", "Files that break off; what comes before is kept: 2.")
+
+
+def test_a_message_is_the_same_after_json():
+    nested = message("finding", finding=message("zero-area", count=3), example=[verbatim("x"), "y"])
+    assert load_message(json.loads(json.dumps(nested.document))) == nested
+
+
+def test_a_new_message_has_a_code_of_the_table_and_a_stored_one_may_not():
+    with pytest.raises(KeyError):
+        message("no-such-code")
+    assert str(Message("no-such-code", {"a": 1})) == "no-such-code a=1"
+    assert str(message("ring-over-limit", count=1)) == "ring-over-limit count=1"
+
+
+def test_a_stored_text_stays_as_it_is():
+    assert load_message("failed: the disk is full").text("de") == "failed: the disk is full"
+
+
+def test_an_older_report_is_shown_as_it_is():
+    old = {
+        "triangles": 5,
+        "skipped": {"zero area": 2_345, "points and lines": 1},
+        "warnings": [
+            {"reason": "skipped: zero area", "count": 2_345, "example": "line 3"},
+            {"reason": "document broken", "count": 1, "example": "at byte 9", "scope": "file"},
+        ],
+    }
+    assert [str(found) for found in findings(old)] == [
+        "2,345 × zero area. Example: line 3",
+        "1 × points and lines.",
+        "1 × document broken. Example: at byte 9",
+    ]
+    assert (skipped_count(old), warning_count(old)) == (2_346, 1)
+    assert [item["text"] for item in report_document(old)["findings"]] == ["2,345 × zero area.", "1 × points and lines.", "1 × document broken."]
+
+
+def test_findings_of_several_files_are_summed_by_code_and_values():
+    report = {
+        "findings": [
+            {"code": "ring-over-limit", "values": {"limit": 9}, "count": 1, "example": ""},
+            {"code": "document-broken", "count": 1, "example": "here"},
+        ]
+    }
+    assert [str(found) for found in sum_findings([*findings(report), *findings(report)])] == [
+        "Files that break off; what comes before is kept: 2. Example: here",
+        "Skipped rings with more than 9 points: 2.",
+    ]
