@@ -108,7 +108,8 @@ def test_a_model_on_its_side_gets_a_hint(tmp_path: Path, run: Run) -> None:
     assert run("create-scene", "town")[0] == 0
     status, out, _ = run("add-files", "town", "side.obj")
     assert status == 0
-    assert "The model seems to lie on its side." in out and "side.obj is 168 m wide, 10 m deep and 170 m high" in out
+    assert "The model seems to lie on its side." in out
+    assert "side.obj is 168 m wide, 10 m deep and 170 m high" in out
     status, out, _ = run("add-files", "town", "side.obj", "--up", "y")
     assert (status, "on its side" in out) == (0, False)
     (tmp_path / "tower.obj").write_text(house(0, 0, 300.0))
