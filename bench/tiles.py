@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
+from rich.table import Table
 
 from map3d import _core
 from map3d.geometry.core_frame import core_frame
@@ -120,3 +122,16 @@ def measure_peers(buildings: int, res_m: float) -> dict[str, Any]:
     tiles = tiles_with_content(scene, frame, places)
     shown = max(tiles, key=lambda tile: len(np.unique(scene.gbuffer(frame, *tile)["id"])))
     return peer_comparison.measure(folder, fields, tiles, shown, pictures=CACHE / "pictures")
+
+
+def measure_all(buildings: int, res_m: float, count: int) -> list[dict[str, Any]]:
+    """Measures both colour formats and prints the table; returns its rows and those of the peers."""
+    rows = [measure(buildings, res_m, count, color) for color in ("webp", "jpeg")]
+    table = Table(title=f"base tiles per second, 256 px, 16 samples, colour and data tiles, {buildings} buildings at {res_m} m per pixel")
+    for column in ("triangles", "tiles", "colour", "one core", "one core, encoded", "all cores, encoded"):
+        table.add_column(column, justify="right")
+    for row in rows:
+        rates = [f"{row[key]:.1f}" for key in ("one_core", "one_core_encoded", "all_cores_encoded")]
+        table.add_row(f"{row['triangles']:,}", str(row["tiles"]), row["color"], *rates)
+    Console().print(table)
+    return [*rows, measure_peers(buildings, res_m)]

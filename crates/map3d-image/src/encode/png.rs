@@ -1,5 +1,5 @@
 //! Encodes PNG: 8-bit, not interlaced, one IDAT, no ancillary chunks. The whole image has one filter and one deflate method, chosen per layer by
-//! measurement (`examples/codecs.rs`).
+//! measurement (docs/benchmarks.md, Encoding).
 
 use std::io::Cursor;
 use std::path::Path;

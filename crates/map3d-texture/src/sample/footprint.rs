@@ -15,7 +15,7 @@
 /// Longest row of taps; a longer one takes a coarser level instead.
 pub const MAX_TAPS: usize = 16;
 
-/// Parameters of the choice of taps; the default was tuned against the exact integral (`examples/footprints.rs`).
+/// Parameters of the choice of taps; the default was tuned against the exact integral.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tuning {
     /// Least length of the footprint's short axis in texels of the level.
