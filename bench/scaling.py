@@ -28,7 +28,7 @@ class Country:
 
     @property
     def base_tiles(self) -> float:
-        """Of all directions. The ground appears foreshortened by the sine of the pitch; what stands on it hides as much ground as it covers."""
+        """Tiles of all directions. The ground is foreshortened by the sine of the pitch; what stands on it hides as much ground as it covers."""
         tile_m2 = (self.tile_px * self.res_m) ** 2
         return self.directions * self.area_km2 * 1e6 * sin(radians(self.pitch_deg)) / tile_m2
 
@@ -56,7 +56,7 @@ class Measured:
     """Adding a job to the SQLite catalogue."""
     scene_bytes_per_building: float = 12.4e9 / 60_000
     tile_bytes_per_base_tile: float = 4.75e9 / 65_536
-    """Of four layers on all levels."""
+    """Total of four layers on all levels."""
     puts_per_block: float = 1.0
     gets_per_block: float = 3.0
     """The block that it may replace; its seam for the block above, in two reads."""

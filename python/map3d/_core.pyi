@@ -86,8 +86,8 @@ class Reader:
     options (JSON): {"transparency": "auto"|"as-is"|"inverted", "strict": bool, "max_image_side_px": 16384, … further limits}, of OBJ also
     {"up": "y"|"z", "split": "file"|"group"}, of CityGML {"theme": str|null (null: the one with the most textures), "lod": str|null (null: best per
     object), "interiors": bool, "appearance_files": [path, …]}; those of another format raise InvalidArgument
-    transform: (source, target, [(x, y), …]) → [(x, y), …] from one coordinate system to another, both as documents write them; None without a
-    transformation. It places textures that are in another one than their surfaces.
+    transform: (source, target, [(x, y), …]) → [(x, y), …] from one coordinate system to another, both as documents write them; None if there is
+    no transformation. It places textures that are in another one than their surfaces.
     """
     def __init__(
         self,
@@ -153,7 +153,7 @@ class AssetMesh:
     def prototypes(self) -> NDArray[np.uint32]:
         """(nt,) numbers of prototypes; 0 for world geometry."""
     def boxes(self, count: int, extent: str | None = None) -> tuple[list[_Box | None], dict[int, _Box], list[int]]:
-        """Returns the boxes of `count` objects in world coordinates, without placed prototypes and None without geometry; those of prototypes in
+        """Returns the boxes of `count` objects in world coordinates, without placed prototypes, None if empty; those of prototypes in
         their own frame; and for each object the number of triangles outside the extent (JSON of `find_clusters`), which its box does not include."""
 
 def detect_format(head: bytes) -> str | None:

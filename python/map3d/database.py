@@ -92,7 +92,7 @@ class Database(Connections):
     lead to it from the version before. Raises UnknownVersion when that is not possible.
 
     Once open, it stays with this file: after the file was removed or replaced, every use raises StoreError, instead of creating an empty file or
-    writing into one that nobody else sees.
+    writing into one that no other process sees.
     """
 
     def __init__(self, path: Path, schema: str, version: int, migrations: Mapping[int, str] | None = None) -> None:

@@ -1,4 +1,4 @@
-"""A disk that fills up during a render: the render ends with a clear error, and with free space it goes on to the same tiles."""
+"""A disk that fills up during a render: the render ends with a clear error, and with free space it resumes to the same tiles."""
 
 import shutil
 import subprocess
@@ -39,7 +39,7 @@ def run_disk_full(sizes: int, houses: int = 24, show: bool = True) -> DiskReport
         for number in range(1, sizes + 1):
             _fill(template, Path(folder) / "disk", used + number * STEP_BYTES, expected, report)
         if show:
-            print(f"full disk: {report.failed} renders failed and went on, {report.completed} had enough space, {len(report.faults)} faults")
+            print(f"full disk: {report.failed} renders failed and resumed, {report.completed} had enough space, {len(report.faults)} faults")
     return report
 
 

@@ -53,7 +53,7 @@ def suspend_first(task, lease, response):
     commits.append(lease)
     if len(commits) == 1:
         os.kill(os.getpid(), signal.SIGSTOP)
-        time.sleep(0.5)  # another thread may take the signal while this one goes on
+        time.sleep(0.5)  # another thread may take the signal while this one continues
     return commit(task, lease, response)
 
 RenderTask.commit = suspend_first

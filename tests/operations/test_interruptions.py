@@ -123,7 +123,7 @@ def test_crash_costs_the_operation_alone(scenario: Scenario, archive: Path, reac
     worker = pause_at("importing house-2.obj", scenario, reached, monkeypatch)
     wait_for(lambda: scenario.catalogue.operation(crashing.id).state is OperationState.FAILED, "the end of the operation")
     assert "SIGSEGV" in scenario.catalogue.operation(crashing.id).message
-    assert worker.poll() is None, "the worker goes on"
+    assert worker.poll() is None, "the worker continues"
     kill(worker)
     scenario.catalogue.retry_operation(crashing.id)
     scenario.work()

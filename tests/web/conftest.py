@@ -17,9 +17,9 @@ def quick_passwords() -> Iterator[None]:
     """Makes hashes of passwords in a millisecond; those of tests/accounts are the product's."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(passwords, "METHOD", "scrypt:256:8:1")
-        passwords._hash_of_nobody.cache_clear()
+        passwords._dummy_hash.cache_clear()
         yield
-    passwords._hash_of_nobody.cache_clear()
+    passwords._dummy_hash.cache_clear()
 
 
 @pytest.fixture(scope="session")

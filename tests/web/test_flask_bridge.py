@@ -1,4 +1,4 @@
-"""A thread of the bridge to Flask never waits for a response that nobody sends."""
+"""A thread of the bridge to Flask never waits for a response that is never sent."""
 
 import asyncio
 

@@ -236,7 +236,7 @@ def broken_patch(address, url, headers, length, data):
 
 
 def arrived(client, url, token, at_least):
-    """Waits until the server has stored some bytes and nobody writes any more; returns their number."""
+    """Waits until the server has stored some bytes and no request writes any more; returns their number."""
     deadline_s = time.monotonic() + 60
     while True:
         assert time.monotonic() < deadline_s, "the bytes do not arrive"

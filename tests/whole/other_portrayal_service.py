@@ -49,7 +49,7 @@ BLOCKS = (
     Block(16_000_000, "barn", (10, -30, 0), (40, -15, 6), (230, 200, 60)),
 )
 ORDER = ("NearPlane", "FarPlane", "Roll", "Left", "Right", "Bottom", "Top", "UP", "POI", "POC")
-"""Of the projection's parameters."""
+"""Order of the projection's parameters."""
 
 
 class Refusal(Exception):

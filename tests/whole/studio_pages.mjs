@@ -2,7 +2,7 @@
 
 const STILL_MS = 500, STILL_TRIES = 60, OPERATION_MS = 400_000;
 
-/** Watches a page. `failed`: refused requests, `overflow`: steps at which the page was wider than the window, filled while the story goes on. */
+/** Watches a page. `failed`: refused requests, `overflow`: steps at which the page was wider than the window, filled as the story runs. */
 export function watch(page, pictures) {
   const failed = [], overflow = [];
   page.on("response", (response) => response.status() >= 400 && failed.push(`${response.status()} ${new URL(response.url()).pathname}`));

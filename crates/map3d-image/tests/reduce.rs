@@ -86,7 +86,7 @@ fn opposite_normals_take_the_nearest() {
     assert_eq!(reduce([Some(&child), None, None, None], 2)[NORMAL][0], [-32_767, 0, 0]);
 }
 
-/// Of one object, from opposite ones to those of a curved surface; the oracle adds in float64 as spec/pyramid.md section 7 says.
+/// Normals of one object, from opposite ones to those of a curved surface. The oracle adds in float64 as spec/pyramid.md section 7 says.
 #[test]
 fn normals_are_normalised_means_rounded_half_away_from_zero() {
     let mut random = Random(11);

@@ -169,8 +169,8 @@ impl AssetMesh {
         PyArray1::from_slice(py, self.0.prototypes())
     }
 
-    /// Boxes of `count` objects in world coordinates, without placed prototypes, and of each prototype in its own frame; None without geometry. With
-    /// an extent (JSON of `find_clusters`), boxes of what is in it, and for each object the number of triangles that are not.
+    /// Boxes of `count` objects in world coordinates, without placed prototypes, and of each prototype in its own frame; None if there is no
+    /// geometry. With an extent (JSON of `find_clusters`), boxes of what is in it, and for each object the number of triangles that are not.
     #[pyo3(signature = (count, extent=None))]
     fn boxes(&self, py: Python<'_>, count: usize, extent: Option<&str>) -> PyResult<Boxes> {
         let extent: Option<Extent> = extent.map(serde_json::from_str).transpose().map_err(|e| invalid(format!("extent: {e}")))?;

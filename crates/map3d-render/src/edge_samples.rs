@@ -37,7 +37,7 @@ pub struct EdgeSamples {
     samples: Vec<EdgeSample>,
     pixels: Vec<EdgePixel>,
     order: SurfaceOrder,
-    /// Of the current surface.
+    /// Samples of the current surface.
     positions: Vec<[i32; 2]>,
     colors: Vec<[u16; 3]>,
 }

@@ -21,7 +21,7 @@ pub struct Shader {
     /// Fragments of the current sub-tile; empty unless `keeps_fragments`.
     fragments: FragmentBuffer,
     keeps_fragments: bool,
-    /// Of the current sub-tile, row by row.
+    /// Visible surfaces of the current sub-tile, row by row.
     runs: Vec<SurfaceRun>,
     order: SurfaceOrder,
     edges: EdgeSamples,

@@ -32,9 +32,9 @@ def is_password(password: str, password_hash: str | None) -> bool:
     if len(password) > MAX_CHARACTERS:
         return False
     with _turn:
-        return check_password_hash(password_hash or _hash_of_nobody(), password) and password_hash is not None
+        return check_password_hash(password_hash or _dummy_hash(), password) and password_hash is not None
 
 
 @cache
-def _hash_of_nobody() -> str:
-    return generate_password_hash("nobody", method=METHOD)
+def _dummy_hash() -> str:
+    return generate_password_hash("unknown", method=METHOD)

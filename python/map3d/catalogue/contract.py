@@ -111,7 +111,7 @@ class Catalogue(OperationCatalogue, Protocol):
         """Returns the tokens of a user, or all of them, ordered by id."""
 
     def find_token(self, digest: str) -> TokenRecord | None:
-        """Returns the token with this digest, None without one."""
+        """Returns the token with this digest, or None."""
 
     def remove_token(self, id: str) -> None:
         """Raises NotFound, naming the existing tokens."""

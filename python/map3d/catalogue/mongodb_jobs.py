@@ -37,7 +37,7 @@ class MongoJobs(MongoPlan):
     # -- leases -----------------------------------------------------------------------------------------------------------------
 
     def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
-        """Expires overdue leases now and then, and when there is no other job: an expired job is the last in the order anyway."""
+        """Expires overdue leases regularly, and when there is no other job: an expired job is the last in the order anyway."""
         every_s = _EXPIRE_EVERY * self.lease_s
         self._expire_overdue_after(rendering, every_s)
         document = self._lease_next(rendering, worker, start)

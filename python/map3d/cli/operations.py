@@ -72,7 +72,7 @@ def cancel(catalogue: Catalogue, id: str) -> tuple[OperationRecord, list[str]]:
 
 @about_one
 def retry(catalogue: Catalogue, id: str) -> tuple[OperationRecord, list[str]]:
-    """Do a failed or cancelled operation again; it goes on where it ended."""
+    """Retry a failed or cancelled operation; it resumes where it stopped."""
     return catalogue.retry_operation(id), [f"operation {id} waits for an operation worker: map3d serve, or map3d work --operations"]
 
 

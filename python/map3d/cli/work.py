@@ -22,7 +22,7 @@ from map3d.requests.scenes import WorkLimits
 def command(workspace: Workspace, renderings: tuple[str, ...], request: WorkLimits, operations: bool, forever: bool, as_json: bool) -> None:
     """Help to render RENDERINGS, or all renderings with open blocks, until nothing is left.
 
-    Joins a map3d render that runs in another process or on another node, and also goes on when that one has ended. The last process to finish
+    Joins a map3d render that runs in another process or on another node, and keeps working after that process ends. The last process to finish
     writes the manifest. map3d work itself never plans: start it after map3d render, or with --forever.
 
     Ctrl-C or SIGTERM finishes the current blocks and exits with status 0; a second one releases them and stops at once.

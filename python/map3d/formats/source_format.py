@@ -57,7 +57,7 @@ class SourceFormat:
     `options`: those of an import that the reader has; of `sparse_options`, an asset records only what differs from the default, since the reader had
     them later. `has_crs`: files name their coordinate system; of others it may be unknown. `is_grouped`: the files of a folder are one source.
     `names_files`: documents name other files, in the folder that was given; `find_files` finds those that are there, `find_missing` those that are
-    not. `links`: documents refer to each other. `in_pieces`: a broken import goes on with the pieces that it has made. `cpu_s`: processor time for
+    not. `links`: documents refer to each other. `in_pieces`: a broken import resumes with its finished pieces. `cpu_s`: processor time for
     each 100 MB or part of it; `memory_bytes`: for files up to that size."""
 
     name: str

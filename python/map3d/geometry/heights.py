@@ -16,7 +16,7 @@ def heights_of(vertical: str | None) -> Heights:
 
 
 def find_vertical_epsg(wkt: str | None) -> int | None:
-    """Returns the EPSG code of the vertical part of a CRS; None without one."""
+    """Returns the EPSG code of the vertical part of a CRS, or None."""
     from map3d.geometry.crs import parse_crs, vertical_crs
 
     part = None if wkt is None else vertical_crs(parse_crs(wkt))

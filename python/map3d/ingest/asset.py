@@ -30,7 +30,7 @@ def read_objects(folder: Path) -> list[dict[str, Any]]:
 
 
 def world_boxes(folder: Path, count: int, extent: Extent | None = None) -> list[Box | None]:
-    """Returns the box of each of `count` objects in world coordinates, placed prototypes included; None without geometry. With an extent, the boxes
+    """Returns the box of each of `count` objects in world coordinates, placed prototypes included, or None. With an extent, the boxes
     of what is in it."""
     return boxes_within(folder, count, extent)[0]
 

@@ -70,7 +70,7 @@ def remove_folder(folder: Path) -> None:
         if folder.exists():  # a file in it went away meanwhile
             remove_folder(folder)
     except OSError as error:
-        raise StoreError(f"{folder}: cannot remove the folder: {error}; mend the cause and run the command again") from error
+        raise StoreError(f"{folder}: cannot remove the folder: {error}; fix the cause and re-run the command") from error
 
 
 def _read_removed(workspace: Workspace, scene: str) -> dict[str, str]:

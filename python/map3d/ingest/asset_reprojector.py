@@ -21,8 +21,7 @@ class AssetReprojector:
     """Transforms the positions of one asset to the scene's CRS. While the scene has none, the first positions determine it."""
 
     def __init__(self, format: str, asset_crs: str | None, scene_crs: str | None, *, stated: bool = False) -> None:
-        """`asset_crs`: the name given by the user (`stated`) or the file, None without one; `scene_crs`: WKT, "local", or None while the scene has
-        no CRS.
+        """`asset_crs`: the name given by the user (`stated`) or the file, or None; `scene_crs`: WKT, "local", or None while the scene has no CRS.
 
         Raises CrsError if the two are incompatible.
         """

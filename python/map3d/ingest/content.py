@@ -64,7 +64,7 @@ def find_content(folders: Sequence[Path], origin: Vec3, options: Mapping[str, An
 
 
 def content_centre(workspace: Workspace, catalogue: Catalogue, scene: str) -> Vec3 | None:
-    """Returns the centre of the largest group of content of a scene, in world coordinates; None without content."""
+    """Returns the centre of the largest group of content of a scene, in world coordinates; None if the scene is empty."""
     origin = catalogue.scene(scene).origin
     clusters = () if origin is None else find_content([workspace.asset_folder(scene, a.name) for a in catalogue.assets(scene)], origin, {}).clusters
     if not clusters:

@@ -18,7 +18,7 @@ Points = NDArray[np.float64]
 NEAR_TOWN_KM: Final = 100.0
 FAR_FROM_TOWN_KM: Final = 40.0
 TIMES_NEARER: Final = 4.0
-"""Swapped axes are believed without other evidence when they lead to a town of the table, and the axes as written lead much farther from one."""
+"""Swapped axes are assumed without other evidence if they lead to a town of the table and the axes as written lead this many times farther."""
 
 MAX_EXTENT_DEG: Final = 5.0
 LOCAL_M: Final = 100_000.0

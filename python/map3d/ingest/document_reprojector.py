@@ -30,7 +30,7 @@ class DocumentReprojector:
     """
 
     def __init__(self, format: str, document_crs: str | None, scene_crs: str | None, *, stated: str | None = None, strict: bool = False) -> None:
-        """`document_crs`: the name in the file, None without one; `stated`: the user's, which counts for all parts; `scene_crs`: WKT, "local",
+        """`document_crs`: the name in the file, or None; `stated`: the user's, which counts for all parts; `scene_crs`: WKT, "local",
         or None while the scene has no CRS; `strict`: the first part that would be skipped raises CrsError."""
         self._format, self._scene_crs, self._stated, self._strict = format, scene_crs, stated, strict
         self._document_crs = stated or document_crs

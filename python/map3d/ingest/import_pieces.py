@@ -28,7 +28,7 @@ def pieces_key(inputs: Mapping[str, Any]) -> str:
 @contextmanager
 def import_pieces(asset: Path, key: str) -> Iterator[Path | None]:
     """Yields the folder for the pieces of an asset, locked; None while another process imports the same. Removes it unless an exception leaves the
-    block: then the next import may go on with it."""
+    block: then the next import may resume with it."""
     _remove_others(asset.parent, asset.name, key)
     folder = asset.with_name(f".{asset.name}.{key}{_SUFFIX}")
     folder.mkdir(parents=True, exist_ok=True)

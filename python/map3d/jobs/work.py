@@ -111,7 +111,7 @@ class Work:
         return None, min(waits, default=None)
 
     def _has_open_jobs(self, name: str, now: float) -> bool:
-        """Sweeps now and then when there are none, since a killed process may have left reduce jobs waiting."""
+        """Sweeps at most once a minute if no job is open, since a killed process may have left reduce jobs waiting."""
         if self._catalogue.has_open_jobs(name):
             return True
         if now - self._swept_s.get(name, -SWEEP_S) < SWEEP_S:

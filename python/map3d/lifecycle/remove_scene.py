@@ -22,7 +22,7 @@ _SHARED: Final = "files"
 
 @dataclass(frozen=True)
 class SceneRemoval:
-    """`files`: number of assets; `bytes`: of the scene, without its renderings; `shared`: URL of the files that other nodes fetch, None without."""
+    """`files`: number of assets; `bytes`: of the scene, without its renderings; `shared`: URL of the files that other nodes fetch, or None."""
 
     name: str
     files: int

@@ -23,7 +23,7 @@ MAX_LINES: Final = 200
 
 
 def do_import(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> str:
-    """Imports the files; assets that are up to date stay, so that a repeated operation goes on where the first one ended. The worker removes the
+    """Imports the files; assets that are up to date stay, so that a repeated operation resumes where the first one stopped. The worker removes the
     uploads once the operation is done. Raises ImportFailed when a file is broken, after importing the others."""
     arguments = operation.arguments
     uploads, request = list(arguments.get("files", ())), from_json(AddFiles, arguments.get("options", {}), skip_unchanged=True)

@@ -155,7 +155,7 @@ class _Heart:
             self.beat()
 
     def store(self) -> bool:
-        """Renews the lease and stores the progress; returns whether the work goes on."""
+        """Renews the lease and stores the progress; returns whether to continue."""
         self._beat_s = time.monotonic()
         return self._catalogue.heartbeat_operation(self._lease, self.stage, self._done, self._total)
 

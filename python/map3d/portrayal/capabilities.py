@@ -64,7 +64,7 @@ class Flavour:
 
 @dataclass(frozen=True)
 class CapabilitiesRequest:
-    """`sections`: names of those to return; `update_sequence`: of the client's document, None without one."""
+    """`sections`: names of those to return; `update_sequence`: of the client's document, or None."""
 
     sections: frozenset[str]
     update_sequence: int | None

@@ -76,7 +76,7 @@ class SceneLayer:
 
 @dataclass(frozen=True)
 class ChosenLayers:
-    """Layers of a request within one scene, in one style. `assets`: None for the whole scene; `lods`: requested level by asset, None without one."""
+    """Layers of a request within one scene, in one style. `assets`: None for the whole scene; `lods`: requested level by asset, or None."""
 
     scene: SceneLayer
     assets: tuple[str, ...] | None

@@ -11,7 +11,7 @@ PortrayalText = Mapping[str, list[str]]
 
 @dataclass(frozen=True)
 class Parameters:
-    """`values`: decoded, by lower-case name. `portrayals`: None without the parameter."""
+    """`values`: decoded, by lower-case name. `portrayals`: None if the parameter is missing."""
 
     values: Mapping[str, str] = field(default_factory=dict)
     portrayals: tuple[PortrayalText, ...] | None = None

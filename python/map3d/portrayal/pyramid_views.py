@@ -59,7 +59,7 @@ class PyramidViews:
         return list(dict.fromkeys(frame.axes for rendering in self._catalogue.renderings(scene) for frame in rendering.frames))
 
     def find(self, scene: str, camera: ViewCamera, selection: Selection, box: Box | None, kinds: Sequence[str]) -> AlignedView | None:
-        """Returns the place of a view in a complete, current rendering that has all `kinds` of layers; None without one."""
+        """Returns the place of a view in a complete, current rendering that has all `kinds` of layers, or None."""
         if not camera.is_orthographic or not selection.is_everything or box is None or not set(kinds) <= set(KINDS):
             return None
         depths = uvd_from_local(camera.axes, corners(box))[:, 2]

@@ -1,7 +1,7 @@
 """The lasting state of the service, above all object ids that are unique over all layers, as OGC 15-001r4 §10.2.1 demands.
 
-Each scene counts its objects from 1. Its ids are divided into pages of 65,536; the first request after a build assigns a page of the service to each
-of them, for ever. The first scene gets the pages from 0, so that its ids stay as they are.
+Each scene counts its objects from 1. Its ids are divided into pages of 65,536; the first request after a build permanently assigns a page of
+the service to each of them. The first scene gets the pages from 0, so that its ids stay as they are.
 """
 
 from pathlib import Path
@@ -23,7 +23,7 @@ CREATE TABLE contents(version TEXT PRIMARY KEY, sequence INTEGER NOT NULL)
 
 
 class ServiceState:
-    """What the service remembers for ever: pages of object ids, and the sequence numbers of its contents. Threads and processes may share it."""
+    """Persistent state of the service: pages of object ids, and the sequence numbers of its contents. Threads and processes may share it."""
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)

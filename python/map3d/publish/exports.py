@@ -1,7 +1,7 @@
 """Exports one view and layer for other software: MBTiles, a folder of z/x/y files, or a Deep Zoom Image. Tiles keep their bytes; normal, id and depth
 of data tiles become PNG.
 
-Every target appears only once it is complete. A stopped export of files goes on where it stopped, unless the tiles have changed.
+Every target appears only once it is complete. A stopped export of files resumes where it stopped, unless the tiles have changed.
 """
 
 import io

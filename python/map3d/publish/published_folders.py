@@ -96,7 +96,7 @@ def _folders(workspace: Workspace) -> Iterator[Path]:
 
 
 def _rendering_in(folder: Path) -> str | None:
-    """Returns the rendering whose manifest a folder holds; None without a readable one."""
+    """Returns the rendering whose manifest a folder holds; None if there is no readable one."""
     manifest = folder / FILE_NAME
     try:
         return Manifest.load(manifest.read_bytes(), str(manifest)).name

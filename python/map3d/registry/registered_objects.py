@@ -17,8 +17,8 @@ Attribute = str | float | int | bool | None
 
 @dataclass(frozen=True)
 class NewObject:
-    """A line of objects.jsonl with its box. `parent`: index among the objects of the same import, None at the top. `box`: local, None without own
-    geometry."""
+    """A line of objects.jsonl with its box. `parent`: index among the objects of the same import, None at the top. `box`: local, None if it has
+    no geometry of its own."""
 
     name: str
     kind: str
@@ -30,7 +30,7 @@ class NewObject:
 
 @dataclass(frozen=True)
 class RegisteredObject:
-    """`kind`: the object's class; `parent`: the parent's id; `box`: local, including all descendants, None without any geometry."""
+    """`kind`: the object's class; `parent`: the parent's id; `box`: local, including all descendants, None if they have no geometry."""
 
     id: int
     asset: str
@@ -67,7 +67,7 @@ class RegisteredObject:
 
 @dataclass(frozen=True)
 class AssetSummary:
-    """`box`: local, None without any geometry; `lods`: the levels of detail that occur, ordered."""
+    """`box`: local, None if the asset has no geometry; `lods`: the levels of detail that occur, ordered."""
 
     count: int
     box: Box | None

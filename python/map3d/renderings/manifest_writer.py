@@ -57,7 +57,7 @@ def current_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderi
 
 
 def _start(record: RenderingRecord, box: Box) -> Vec3 | None:
-    """Returns the centre of the rendering's window, None without a window: viewers then start at the centre of the box."""
+    """Returns the centre of the rendering's window, or None if it has no window: viewers then start at the centre of the box."""
     window = record.window
     return None if window is None else (window.x_m, window.y_m, (box[0][2] + box[1][2]) / 2)
 

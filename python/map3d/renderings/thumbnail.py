@@ -30,7 +30,7 @@ _SUN: Final = tuple(round(axis, 9) for axis in DEFAULT_LIGHT.towards)
 
 
 def make_thumbnail(store: TileStore) -> Thumbnail | None:
-    """Returns None without colours or without tiles, and if one of the tiles is damaged, which `map3d verify` reports."""
+    """Returns None if there are no colours or no tiles, or if one of the tiles is damaged, which `map3d verify` reports."""
     try:
         extent = _find_extent(_Level(store, 0).read("id", "color", "picture"))
         if extent is None:
@@ -81,7 +81,7 @@ class _Level:
 
 
 def _find_extent(pixels: NDArray[Any] | None) -> tuple[int, int, int, int] | None:
-    """Returns (left, top, right, bottom) of the covered pixels, of ids or colours; None without any."""
+    """Returns (left, top, right, bottom) of the covered pixels, of ids or colours; None if all are empty."""
     covered = np.zeros((1, 1), bool) if pixels is None else (pixels if pixels.ndim == 2 else pixels[..., 3]) > 0
     if not covered.any():
         return None

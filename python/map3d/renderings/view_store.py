@@ -42,7 +42,7 @@ INSERT INTO total VALUES (0, 0);
 
 _OF_SCENE: Final = "EXISTS (SELECT 1 FROM view_scene WHERE view_scene.key = view.key AND scene = ?)"
 _OF_NO_SCENE: Final = "NOT EXISTS (SELECT 1 FROM view_scene WHERE view_scene.key = view.key)"
-"""Images that an older version stored: nobody knows their scenes any more, so they go with the first scene that is removed."""
+"""Images that an older version stored: their scene is unknown; they are deleted with the first removed scene."""
 
 
 def views_folder(workspace: Workspace) -> Path:

@@ -78,7 +78,7 @@ class AddFiles(FormatOptions, ReadLimits):
         help="Leave files alone that are in the scene as they are.",
         lacks={
             "cli": "the command imports what it is given again, so that a user can repair an asset",
-            "rest": "a repeated operation goes on where the first one ended, so that unchanged files are always skipped",
+            "rest": "a repeated operation resumes where the first one stopped, so that unchanged files are always skipped",
             "studio": "as in the REST API",
         },
     )

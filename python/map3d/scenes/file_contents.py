@@ -32,7 +32,7 @@ class Rasters:
 @dataclass(frozen=True)
 class FileContents:
     """`source`: name of the file, or of the first raster of a terrain; `rasters`: their number, None for other formats. `crs`: name of the CRS of the
-    coordinates in the file; `place`: where the file lies. `box`: world coordinates of the scene, None without geometry. `outside`: triangles left out
+    coordinates in the file; `place`: where the file lies. `box`: world coordinates of the scene, None if empty. `outside`: triangles left out
     of a built scene, since they lie far from the rest. `bytes`: of the file at its import. `textures`: None for a file that names no images."""
 
     asset: str
@@ -75,7 +75,7 @@ def file_contents(workspace: Workspace, catalogue: Catalogue, scene: str) -> lis
 
 
 def union(boxes: Sequence[Box | None]) -> Box | None:
-    """Returns the box around boxes; None without any."""
+    """Returns the box around boxes, or None if there are none."""
     known = [box for box in boxes if box is not None]
     if not known:
         return None

@@ -27,7 +27,7 @@ OnSource = Callable[[str, int, int, str], None]
 
 @dataclass(frozen=True)
 class SiteFiles:
-    """The folder of a site and how its files are imported. `allow_empty`: believe an empty folder, from which files seem to have vanished."""
+    """The folder of a site and how its files are imported. `allow_empty`: accepts an empty folder, from which files seem to have vanished."""
 
     scene: SceneRecord
     folder: Path

@@ -37,8 +37,8 @@ _PROBE_LEVEL: Final = 8
 
 @dataclass(frozen=True)
 class SurfaceDetail:
-    """`texel_m`: side of the finer texels, None without textures; `triangle_m`: side of a square as large as a usual triangle, which is `triangle_px`
-    pixels long at the finest resolution that shows more of the shape."""
+    """`texel_m`: side of the finer texels, None if there are no textures; `triangle_m`: side of a square as large as a usual triangle,
+    which is `triangle_px` pixels long at the finest resolution that shows more of the shape."""
 
     texel_m: float | None
     triangle_m: float
@@ -75,7 +75,7 @@ def choose_resolution(scene: _core.Scene, views: list[ViewAngles], detail: Surfa
 
 
 def surface_detail(areas: NDArray[np.float64], texels: NDArray[np.float64], terrain: NDArray[np.bool_]) -> SurfaceDetail | None:
-    """Returns the detail of sampled triangles, None without any. `areas`: square metres; `texels`: sides in metres, NaN without a texture. The usual
+    """Returns the detail of sampled triangles, or None. `areas`: square metres; `texels`: sides in metres, NaN without a texture. The usual
     triangle is one of terrain only where there is nothing else."""
     textured = np.isfinite(texels) & (areas > 0)
     seen = areas > 0

@@ -31,7 +31,7 @@ MARGIN_PX: Final = 4
 
 @dataclass(frozen=True)
 class _Layers:
-    """The layers that a picture is drawn from. `normal`: None for colours that stay as they are; `openness`: ambient occlusion, None without it."""
+    """The layers that a picture is drawn from. `normal`: None for colours that stay as they are; `openness`: ambient occlusion, or None."""
 
     color: Layer
     normal: Layer | None

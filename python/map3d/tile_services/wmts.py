@@ -11,7 +11,7 @@ from map3d.tile_services.tiled_view import TiledView, TileMatrix
 VERSION: Final = "1.0.0"
 WEB_MERCATOR_URN: Final = "urn:ogc:def:crs:EPSG::3857"
 _NAMESPACE: Final = "http://www.opengis.net/wmts/1.0"
-"""Of elements without a prefix, because QGIS reads their names as text."""
+"""Namespace of elements without a prefix, because QGIS reads their names as text."""
 _NAMESPACES: Final = {
     "ows": "http://www.opengis.net/ows/1.1",
     "xlink": "http://www.w3.org/1999/xlink",

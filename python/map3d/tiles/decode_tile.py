@@ -27,12 +27,12 @@ def kinds_of(layer: Layer) -> tuple[str, ...]:
 
 
 def layer_with(layers: Iterable[Layer], kind: str) -> Layer | None:
-    """Returns the first layer whose tiles hold a kind of pixels; None without one."""
+    """Returns the first layer whose tiles hold a kind of pixels, or None."""
     return next((layer for layer in layers if kind in kinds_of(layer)), None)
 
 
 def find_layer(layers: Iterable[Layer], name: str) -> tuple[Layer, Layer] | None:
-    """Returns the layer that a name means, and the stored one that has its pixels; None without one.
+    """Returns the layer that a name means, and the stored one that has its pixels, or None.
 
     They are the same, but where a rendering has data tiles, `normal`, `id` and `depth` mean the PNG layers that `as_layer` makes of them.
     """

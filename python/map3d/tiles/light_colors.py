@@ -11,7 +11,7 @@ from map3d.types import Vec3
 
 AMBIENT: Final = 0.42
 DIFFUSE: Final = 0.76
-"""Of the viewer's light."""
+"""Factor of the viewer's direct light on a surface that faces the sun."""
 WHITE: Final = (1.0, 1.0, 1.0)
 
 Pixels = NDArray[np.uint8]

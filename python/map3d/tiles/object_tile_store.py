@@ -1,4 +1,4 @@
-"""A tile store in an object store (spec/catalogue.md): one indexed object per block, written on condition that nobody else wrote it."""
+"""A tile store in an object store (spec/catalogue.md): one indexed object per block, written only if no other process has written it."""
 
 import hashlib
 import json
@@ -261,7 +261,7 @@ class ObjectTileStore:
         return self._read_index(block)
 
     def _read_index(self, block: BlockId) -> tuple[str, BlockIndex] | None:
-        """Reads the entity tag and the index; None without the block. Raises Corrupt, UnknownVersion."""
+        """Reads the entity tag and the index, or returns None if the block is missing. Raises Corrupt, UnknownVersion."""
         name, where = _object_name(block), f"{self.url}/{_object_name(block)}"
         found = self._objects.get_start(name, START_BYTES)
         if found is not None and len(found[0]) < (need := index_bytes(found[0], where)) <= found[2]:

@@ -6,7 +6,7 @@ from typing import Final
 from map3d.errors import BadRequest
 
 MAX_NAME_BYTES: Final = 255
-"""Of one file or folder; the limit of most file systems."""
+"""Limit for the name of one file or folder, as in most file systems."""
 MAX_PATH_BYTES: Final = 1_024
 MAX_DEPTH: Final = 32
 _FORBIDDEN: Final = frozenset('/\\:"<>|*?')

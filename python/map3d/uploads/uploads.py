@@ -1,6 +1,6 @@
 """Uploads in a folder: each has a folder of its own, with `info.json` (name, size, who) and `data`, whose size says how much has arrived.
 
-Nothing else is remembered, so that an upload goes on after any restart. Several processes may share the folder.
+Nothing else is remembered, so that an upload resumes after any restart. Several processes may share the folder.
 """
 
 import errno
@@ -27,7 +27,7 @@ from map3d.uploads.upload_names import check_path
 INFO: Final = "info.json"
 DATA: Final = "data"
 RECOUNT_S: Final = 10.0
-"""How long the sum of all uploads is believed before it is counted again."""
+"""Maximum age of the cached total size of all uploads."""
 SYNC_BYTES: Final = 64 << 20
 _ID: Final = re.compile(r"[0-9a-f]{16}", re.ASCII)
 _BATCH: Final = re.compile(r"[A-Za-z0-9_-]{1,64}", re.ASCII)

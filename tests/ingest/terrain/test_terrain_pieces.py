@@ -1,4 +1,4 @@
-"""Terrain is the same whatever the number of threads, and an import that was killed goes on with its finished pieces."""
+"""Terrain is the same whatever the number of threads, and an import that was killed resumes with its finished pieces."""
 
 import os
 import shutil
@@ -115,7 +115,7 @@ def test_a_damaged_piece_and_one_without_its_texture_are_built_again(rasters: Pa
     (pieces / "textures" / name).unlink()
     (pieces / "textures" / name).write_bytes(b"x" * (size - 1))
     built = count_tiles(monkeypatch)
-    assert run(rasters, "mended", pieces) == expected
+    assert run(rasters, "repaired", pieces) == expected
     assert len(built) == 2
 
 

@@ -84,7 +84,7 @@ function readColumns(body: Uint8Array, runs: number, labels: number, residuals: 
 
 function paint(kind: DataKind, width: number, height: number, labels: number, [codes, lengths, ids, normals, shapes, right, down, starts, readResidual, isDone]: Columns): DataTile {
   const values = kind === "normal" ? new Uint8Array(3 * width * height) : new Uint32Array(width * height);
-  // Of labels: the plane's depth at (0, 0), and the offset of the first pixel of the last run.
+  // By label: the plane's depth at (0, 0), and the offset of the first pixel of the last run.
   const [zeros, offsets] = [ids.slice(), new Int32Array(labels)];
   let [run, begun, started, length] = [0, 0, 0, 0];
   // Ends and labels of the runs above.

@@ -15,7 +15,7 @@ export interface ViewTemplate {
   readonly side_px: number;
   /** Quality of colours, 0 to 100; undefined for the service's. */
   readonly colorQuality?: number | undefined;
-  /** Of the image layer SUN. */
+  /** Direction of the sun of the image layer SUN. */
   readonly sun?: SunDirection | undefined;
   /** null: the order of the standard. */
   readonly projection: readonly ProjectionParameter[] | null;

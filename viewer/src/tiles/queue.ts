@@ -1,6 +1,6 @@
 export interface TileRequest {
   readonly key: string;
-  /** @param isAhead whether nobody waits for it yet */
+  /** @param isAhead whether it is a prefetch */
   run(signal: AbortSignal, isAhead: () => boolean): Promise<void>;
 }
 
@@ -9,7 +9,7 @@ interface RunningRequest {
   readonly done: Promise<void>;
   /** A caller waits for it: it is not aborted when it leaves the view. */
   pinned: boolean;
-  /** Nobody waits for it yet. */
+  /** Whether it is a prefetch. */
   ahead: boolean;
 }
 

@@ -302,7 +302,7 @@ test("see the shadow at 17:00", async () => {
   }
   expect(places.dark.length).toBeGreaterThan(20);
   expect(places.lit.length).toBeGreaterThan(200);
-  // Of the positions in shadow according to rays, the fraction that is darker than sunlit ground.
+  // The fraction of positions in shadow according to rays that is darker than sunlit ground.
   await expect.poll(async () => {
     const shot = await decoded(await page.screenshot());
     const values = (of: readonly Vec2[]): number[] => of.map((place) => pixel(shot, place).reduce((sum, part) => sum + part, 0));

@@ -29,7 +29,7 @@ pub struct Batch {
     pub ranks: Vec<Rank>,
     /// 0: world geometry; k > 0: geometry of prototype k, in its own frame.
     pub prototype: u32,
-    /// Of world geometry: number of its coordinate system among those of the reader (0: the document's).
+    /// For world geometry, the number of its coordinate system among those of the reader (0: the document's).
     pub crs: u16,
     /// The reader has already moved `uvs` as far as each material's wrap mode allows; the writer keeps them.
     pub uvs_shifted: bool,

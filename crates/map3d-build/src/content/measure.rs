@@ -18,7 +18,7 @@ const PIECE: usize = 1 << 20;
 #[derive(Serialize, Deserialize)]
 struct File {
     version: u32,
-    /// Of the files that were measured.
+    /// Digest of the measured files.
     digest: String,
     #[serde(flatten)]
     cells: CellsDocument,

@@ -112,7 +112,7 @@ struct Label {
     start: i64,
     x: u32,
     y: u32,
-    /// Of rough labels: the offset of the first pixel of the last run.
+    /// For rough labels, the offset of the first pixel of the last run.
     offset: u32,
 }
 

@@ -7,7 +7,7 @@ use super::{FRACTION_BITS, MAX_START, Slopes};
 
 /// Labels with fewer pixels have no plane of their own.
 const LEAST_PIXELS: i64 = 8;
-/// Of a plane of a label, units per pixel.
+/// Greatest slope of a label's plane, units per pixel.
 const MAX_SLOPE: f64 = 100_000.0;
 /// Slopes of another label are used when its plane differs by less than this, in units.
 const SLOPE_TOLERANCE: f64 = 0.35;
@@ -41,7 +41,7 @@ pub struct Label {
     pub start: i64,
     /// Number of pixels off the plane.
     off: i64,
-    /// Of a rough label: the offset of the first pixel of its last run.
+    /// For rough labels, the offset of the first pixel of the last run.
     pub offset: u32,
 }
 

@@ -50,7 +50,7 @@ pub const DEPTH: MethodPair = methods((Filter::Sub, Deflate::Matching), (Filter:
 pub const SHADE: MethodPair = alike((Filter::Sub, Deflate::Thorough));
 pub const SUN16: MethodPair = alike((Filter::None, Deflate::Thorough));
 
-/// Of images of one bit per pixel.
+/// Method for images with one bit per pixel.
 const BITS: Method = Method { filter: Filter::None, deflate: Deflate::Matching };
 
 /// Bits per sample, and the PNG's colour type.

@@ -11,7 +11,7 @@ use crate::document::asset_folder::{AssetFolder, FileError};
 use crate::document::report_builder::ReportBuilder;
 
 const MAX_LISTS: usize = 4096;
-/// Of all lists together.
+/// Total for all lists.
 const MAX_LIST_BYTES: u64 = 64 << 20;
 
 /// Labels by code.

@@ -59,7 +59,7 @@ pub struct GeometryArena {
     pub rings: Vec<Ring>,
     pub points: Vec<Vec3>,
     pub by_id: IdMap<NodeId>,
-    /// Of textured surfaces.
+    /// Appearances of textured surfaces.
     pub own_appearances: Vec<OwnAppearance>,
 }
 

@@ -56,7 +56,7 @@ pub struct Tessellator {
     open: Vec<OpenBatch>,
     /// Metres per unit of the axes of each coordinate system.
     scales: Vec<Vec3>,
-    /// Of each coordinate system that has a name.
+    /// Key of each coordinate system that has a name.
     keys: Vec<Option<HorizontalKey>>,
     /// Polygons are those of a prototype, in a frame of its own in metres.
     is_prototype: bool,

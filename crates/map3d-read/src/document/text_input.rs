@@ -11,7 +11,7 @@ use map3d_base::{Error, Reason, Result};
 use memchr::{memchr, memchr_iter};
 
 use super::byte_source::ByteSource;
-use super::mended_utf8::MendedUtf8;
+use super::lossy_utf8::LossyUtf8;
 
 const ENCODING_BYTES: usize = 4096;
 const BUFFER_BYTES: usize = 1 << 17;
@@ -20,7 +20,7 @@ const BUFFER_BYTES: usize = 1 << 17;
 pub enum TextInput {
     Plain(BufReader<ByteSource>),
     Decoded(Box<BufReader<DecodeReaderBytes<ByteSource, Vec<u8>>>>),
-    Mended(Box<BufReader<MendedUtf8<ByteSource>>>),
+    Lossy(Box<BufReader<LossyUtf8<ByteSource>>>),
 }
 
 /// Something wrong with the encoding of a document: a reason and an example, as in a report.
@@ -35,7 +35,7 @@ impl Read for TextInput {
         match self {
             Self::Plain(input) => input.read(out),
             Self::Decoded(input) => input.read(out),
-            Self::Mended(input) => input.read(out),
+            Self::Lossy(input) => input.read(out),
         }
     }
 }
@@ -46,7 +46,7 @@ impl BufRead for TextInput {
         match self {
             Self::Plain(input) => input.fill_buf(),
             Self::Decoded(input) => input.fill_buf(),
-            Self::Mended(input) => input.fill_buf(),
+            Self::Lossy(input) => input.fill_buf(),
         }
     }
 
@@ -55,7 +55,7 @@ impl BufRead for TextInput {
         match self {
             Self::Plain(input) => input.consume(n),
             Self::Decoded(input) => input.consume(n),
-            Self::Mended(input) => input.consume(n),
+            Self::Lossy(input) => input.consume(n),
         }
     }
 }
@@ -108,7 +108,7 @@ pub fn open_checked_xml(path: &Path) -> Result<(TextInput, Vec<EncodingFault>)> 
         None => Ok((TextInput::Plain(BufReader::with_capacity(BUFFER_BYTES, file)), faults)),
         Some(fault) => {
             faults.push(fault);
-            Ok((TextInput::Mended(Box::new(BufReader::with_capacity(BUFFER_BYTES, MendedUtf8::new(file)))), faults))
+            Ok((TextInput::Lossy(Box::new(BufReader::with_capacity(BUFFER_BYTES, LossyUtf8::new(file)))), faults))
         }
     }
 }

@@ -61,7 +61,7 @@ impl Budget {
 
 /// Appends the triangles of a polygon, counter-clockwise. `points`: in the plane; ring `k` ends before `ends[k]` and is open.
 ///
-/// Of points in the same place, triangles have the first. Where rings cross, triangles that an edge divides belong to the polygon as a whole or not.
+/// Triangles use the first of several points in the same place. Where rings cross, triangles that an edge divides belong to the polygon as a whole or not.
 /// Returns an error if the polygon takes too many steps: its edges cross each other nearly everywhere.
 pub fn triangulate(points: &[[f64; 2]], ends: &[usize], triangles: &mut Vec<u32>) -> Result<(), PolygonError> {
     if points.len() > MAX_VERTICES {

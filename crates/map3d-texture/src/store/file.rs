@@ -241,7 +241,7 @@ thread_local! {
 #[derive(Default)]
 struct Reader {
     decoder: Level0Decoder,
-    /// Of a file, or of one of its sections.
+    /// Content of a file or of one of its sections.
     bytes: Vec<u8>,
 }
 

@@ -49,7 +49,7 @@ class HeightTint:
 
 
 def write_tint(folder: Path, grid: VertexGrid, field: HeightField, tiles: Iterator[GridTile]) -> HeightTint | None:
-    """Writes the image into `folder`; None without any height. `tiles`: those where there may be heights."""
+    """Writes the image into `folder`; returns None if there are no heights. `tiles`: those where there may be heights."""
     heights = _sample(grid, field, list(tiles))
     if not len(heights):
         return None

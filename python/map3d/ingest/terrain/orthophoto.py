@@ -27,7 +27,7 @@ SAMPLE_PX: Final = 1024
 """Side of the overview that determines the range of values."""
 
 WHOLE_SAMPLE_PX: Final = 1 << 24
-"""Of a larger raster without overviews, only windows are read for that."""
+"""Rasters with more pixels and no overviews are sampled in windows."""
 
 SAMPLE_WINDOWS: Final = 256
 SAMPLE_WINDOW_PX: Final = 64

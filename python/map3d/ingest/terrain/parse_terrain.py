@@ -144,7 +144,7 @@ def _free_bytes() -> float:
 
 
 def _choose_target(raster: Path | None, stated_crs: str | None, scene_crs: str | None) -> CRS | None:
-    """Returns the scene's CRS. If it has none yet: the raster's own if projected in metres, else its UTM zone; None without any CRS.
+    """Returns the scene's CRS. If it has none yet: the raster's own if projected in metres, else its UTM zone; None if the raster has no CRS.
 
     `stated_crs`: the user's choice for the raster. Raises CrsError if it is incompatible with a scene in local metres.
     """

@@ -29,7 +29,7 @@ MAX_APART_PX: Final = 0.5
 
 
 class _Place(NamedTuple):
-    """Pixel corners to positions, east first; the CRS of these, None without one."""
+    """Transform of pixel corners to positions, east first, and the CRS of these, or None."""
 
     transform: Affine
     crs: CRS | None

@@ -17,7 +17,7 @@ from map3d.ingest.terrain.vertex_grid import GridTile, VertexGrid
 
 @dataclass(frozen=True)
 class TerrainTile:
-    """`positions`: (n, 3) world; `triangles`: (t, 3); `uvs`: (n, 2) per vertex, None without an image. `texture`: None outside the photo."""
+    """`positions`: (n, 3) world; `triangles`: (t, 3); `uvs`: (n, 2) per vertex, None if there is no image. `texture`: None outside the photo."""
 
     row: int
     column: int

@@ -67,7 +67,7 @@ class AccessControl:
             return self._limits
 
     def recognise(self, cookie: str | None, authorization: str | None) -> Caller:
-        """Returns who sends these headers. A token that is not valid stands for nobody, even beside a valid cookie."""
+        """Returns who sends these headers. An invalid token authenticates no one, even with a valid cookie."""
         if authorization is not None:
             scheme, _, token = authorization.partition(" ")
             return Caller(self.accounts.find_token(token.strip()) if scheme.lower() == "bearer" else None, None)

@@ -101,7 +101,7 @@ class OpenStores:
         return layer_names(stored for opened in self.stores_of_view(rendering, view) for stored in opened.store.shape.layers)
 
     def _get(self, rendering: str, track: str) -> OpenStore | None:
-        """Returns None without a store. Checks the file at most every RECHECK_S."""
+        """Returns None if there is no store. Checks the file at most every RECHECK_S."""
         key = (rendering, track)
         with self._lock:
             known = self._open.get(key)

@@ -119,7 +119,7 @@ class App:
             close_catalogue()
 
     async def _end_flask_threads(self) -> None:
-        """Answers the requests that wait for a thread. Threads hand their responses to this event loop; they would wait for ever for one that has
+        """Answers the requests that wait for a thread. Threads hand their responses to this event loop; they would wait forever for one that has
         stopped."""
         await asyncio.get_running_loop().run_in_executor(None, self._flask_threads.shutdown)
 

@@ -1,7 +1,7 @@
 """The bridge from ASGI to Flask: a2wsgi, whose threads outlive a broken connection.
 
-In a2wsgi, a thread hands each chunk of its response to a queue that a task of the event loop sends. When that task fails or is cancelled, nobody
-empties the queue, and the thread of a response with more chunks than the queue holds waits for ever. Here it learns that the task has ended.
+In a2wsgi, a thread hands each chunk of its response to a queue that a task of the event loop sends. When that task fails or is cancelled,
+the queue stays full, and the thread of a response with more chunks than the queue holds waits forever. Here it learns that the task has ended.
 """
 
 import threading
@@ -38,7 +38,7 @@ class _Responder(WSGIResponder):
 
     def send(self, message: Any) -> None:
         """Called by the thread. Raises ConnectionAbortedError for a body that is not sent any more, which ends the response; not for its start,
-        since nobody would close the response then."""
+        since the response would never be closed then."""
         if not self._ended.is_set():
             super().send(message)
         if self._ended.is_set() and message["type"] == "http.response.body":

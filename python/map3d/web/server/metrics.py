@@ -33,7 +33,7 @@ _SIZE: Final = _GAUGES + len(GAUGES)
 
 
 class Metrics:
-    """The counts of this process. Threads may share it. Without a folder, nobody reads them."""
+    """The counts of this process. Threads may share it. Without a folder, counts stay in this process."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self._lock = threading.Lock()

@@ -7,7 +7,7 @@ from typing import Any, Final
 from map3d.web.tiles.tile_route import Receive, Scope, Send
 
 MAX_BODY_BYTES: Final = 2 << 20
-"""Of all requests to Flask, which has smaller limits of its own for most routes."""
+"""Limit for all requests to Flask, which has smaller limits for most routes."""
 BODY_S: Final = 30.0
 
 

@@ -108,7 +108,7 @@ class TileServiceRoute:
 
 
 class _Relay:
-    """Forwards the answer of the tile route, with an image in place of an empty tile, and without permission to cache for ever: the URL has no
+    """Forwards the answer of the tile route, with an image in place of an empty tile, and without permission to cache forever: the URL has no
     version."""
 
     def __init__(self, send: Send, tile_px: int, media_type: str, *, head: bool) -> None:

@@ -14,7 +14,7 @@ if (panel) {
   new Uploader(panel);
 }
 
-/** What was begun, by file: {url, time}. Kept in the browser, so that the same file goes on after the page was closed. */
+/** Unfinished uploads by file: {url, time}. Kept in the browser, so that the same file resumes after the page was closed. */
 function remembered() {
   try {
     const all = JSON.parse(localStorage.getItem(MEMORY) ?? "{}");
@@ -31,7 +31,7 @@ function remember(key, url) {
   try {
     localStorage.setItem(MEMORY, JSON.stringify(all));
   } catch {
-    // Without storage, an upload cannot go on after the page was closed.
+    // Without storage, an upload cannot resume after the page was closed.
   }
 }
 
@@ -136,7 +136,7 @@ function Uploader(place) {
     });
   }
 
-  /** Finds out where to go on: at the offset of an earlier upload of the same file, or at 0 of a new one. */
+  /** Finds out where to resume: at the offset of an earlier upload of the same file, or at 0 of a new one. */
   async function begin(item) {
     const earlier = item.url ?? remembered()[item.key]?.url;
     if (earlier) {

@@ -117,7 +117,7 @@ def _own_path(path: str) -> str:
 
 
 def _client_address() -> str:
-    """Returns the client's network address. A proxy on this host is believed about the address that it saw, the last in X-Forwarded-For."""
+    """Returns the client's network address. Trusts the last X-Forwarded-For address if the request comes from this host."""
     address = request.remote_addr or ""
     forwarded = request.headers.get("X-Forwarded-For", "").rpartition(",")[2].strip()
     try:

@@ -19,7 +19,7 @@ MAX_PLACES: Final = 5
 
 @dataclass(frozen=True)
 class Place:
-    """`number`: that of the cluster; `kept`: it is in the scene; `is_stray`: it has no whole object, so that nobody would choose it."""
+    """`number`: that of the cluster; `kept`: it is in the scene; `is_stray`: it has no whole object and is not offered."""
 
     number: int
     text: str

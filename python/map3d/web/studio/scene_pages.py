@@ -32,7 +32,7 @@ scene_pages = Blueprint("scene_pages", __name__, url_prefix="/studio")
 
 OPERATIONS: Final = 8
 MAX_IMPORT_BYTES: Final = 2 << 20
-"""Of the form that lists the uploads of an import: 50,000 files."""
+"""Limit for the form that lists the uploads of an import: 50,000 files."""
 
 
 @scene_pages.get("/")

@@ -58,7 +58,7 @@ log: Final = logging.getLogger("map3d.web")
 
 @dataclass(frozen=True)
 class TileUrl:
-    """A well-formed tile URL. `version`: the value of `v`, None without one."""
+    """A well-formed tile URL. `version`: the value of `v`, or None."""
 
     rendering: str
     view: str

@@ -171,7 +171,7 @@ class UploadRoute:
         return complete
 
     async def _clean(self) -> None:
-        """Removes expired uploads now and then."""
+        """Removes expired uploads at most every CLEAN_S."""
         if time.monotonic() - self._cleaned_s > CLEAN_S:
             self._cleaned_s = time.monotonic()
             await self._run(lambda: self.uploads.remove_expired(self._in_use()))
@@ -211,7 +211,7 @@ def _number(headers: Mapping[str, str], name: str) -> int:
 
 
 def _checksum(headers: Mapping[str, str]) -> tuple[Any, bytes] | None:
-    """Returns a hash and the expected digest, None without Upload-Checksum. Raises BadRequest."""
+    """Returns a hash and the expected digest, or None if Upload-Checksum is missing. Raises BadRequest."""
     if "upload-checksum" not in headers:
         return None
     name, _, value = headers["upload-checksum"].partition(" ")

@@ -139,7 +139,7 @@ impl CityGmlReader {
             text: &mut self.text,
         }
         .read_city_object();
-        // Of an object that the document breaks off in, the complete polygons are kept.
+        // If the document breaks off in an object, its complete polygons are kept.
         let is_kept = match &parsed {
             Ok(()) => true,
             Err(_) => self.xml.is_malformed() && !self.options.strict && self.city_object.has_geometry(),

@@ -190,7 +190,7 @@ impl GeometryParser<'_> {
     /// Reads all positions in the current element, at any depth.
     pub fn read_ring_points(&mut self, format: PositionFormat, read: &mut PositionsRead) -> Result<()> {
         let depth = self.xml.depth();
-        // Of the elements around the current position that say how positions are read: their depths and what they say.
+        // Depths and formats of the enclosing elements that say how positions are read.
         let mut formats = vec![(depth, format)];
         while self.xml.depth() >= depth {
             match self.xml.next_tag()? {

@@ -111,7 +111,7 @@ impl OtherDocuments<'_> {
     }
 
     fn read_elements(&mut self, xml: &mut XmlReader, wanted: &WantedElements, appearances: Option<AppearanceScope>, max_bytes: u64) -> Result<()> {
-        // Of the elements around the current position that say how positions are read: their depths and what they say.
+        // Depths and formats of the enclosing elements that say how positions are read.
         let mut formats = vec![(0, PositionFormat::new(DOCUMENT_CRS))];
         loop {
             match xml.next_tag()? {

@@ -32,7 +32,7 @@ pub struct PreScan {
     pub appearances: Appearances,
     /// Ids that a city object refers to but does not define.
     pub referenced_ids: IdSet,
-    /// Of all materials, in city objects and outside.
+    /// Counts of all materials, in city objects and outside.
     pub transparency: TransparencyCounts,
 }
 

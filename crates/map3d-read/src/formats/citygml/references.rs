@@ -21,9 +21,9 @@ pub const OWN_DOCUMENT: DocumentNumber = 0;
 const MAX_DOCUMENTS: usize = 4096;
 const MAX_NAMES: usize = 1 << 16;
 const MAX_WANTED: usize = 1_000_000;
-/// Of a reference that is kept for the report.
+/// Longest reference that is kept for the report.
 const MAX_REFERENCE_CHARS: usize = 200;
-/// Of a name that is kept; a longer one is no name of a file.
+/// Longest file name that is kept.
 const MAX_NAME_BYTES: usize = 1024;
 
 /// A document, and its ids in those of `References`.

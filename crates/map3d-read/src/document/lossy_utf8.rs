@@ -1,4 +1,4 @@
-//! Mends text in broken UTF-8 as it is read: bytes that are not UTF-8 are Windows-1252, and zero bytes are left out.
+//! Decodes broken UTF-8 as it is read: bytes that are not UTF-8 are Windows-1252, and zero bytes are left out.
 
 use std::io::{self, Read};
 
@@ -6,26 +6,26 @@ use encoding_rs::WINDOWS_1252;
 
 const BUFFER_BYTES: usize = 1 << 16;
 
-pub struct MendedUtf8<R> {
+pub struct LossyUtf8<R> {
     source: R,
     raw: Vec<u8>,
     /// Bytes at the front of `raw` that may begin a character.
     kept: usize,
-    mended: Vec<u8>,
+    decoded: Vec<u8>,
     at: usize,
 }
 
-impl<R: Read> MendedUtf8<R> {
+impl<R: Read> LossyUtf8<R> {
     pub fn new(source: R) -> Self {
-        Self { source, raw: vec![0; BUFFER_BYTES], kept: 0, mended: Vec::new(), at: 0 }
+        Self { source, raw: vec![0; BUFFER_BYTES], kept: 0, decoded: Vec::new(), at: 0 }
     }
 
-    /// Reads and mends more; returns false at the end.
+    /// Decodes more; returns false at the end.
     fn refill(&mut self) -> io::Result<bool> {
         let n = self.source.read(&mut self.raw[self.kept..])?;
         let end = self.kept + n;
         (self.at, self.kept) = (0, 0);
-        self.mended.clear();
+        self.decoded.clear();
         let mut start = 0;
         while start < end {
             let (valid, invalid) = match std::str::from_utf8(&self.raw[start..end]) {
@@ -36,9 +36,9 @@ impl<R: Read> MendedUtf8<R> {
                 }
                 Err(e) => (e.valid_up_to(), e.error_len().unwrap_or(end - start - e.valid_up_to())),
             };
-            self.mended.extend(self.raw[start..start + valid].iter().filter(|byte| **byte != 0));
+            self.decoded.extend(self.raw[start..start + valid].iter().filter(|byte| **byte != 0));
             let (letters, _) = WINDOWS_1252.decode_without_bom_handling(&self.raw[start + valid..start + valid + invalid]);
-            self.mended.extend_from_slice(letters.as_bytes());
+            self.decoded.extend_from_slice(letters.as_bytes());
             start += valid + invalid;
             if self.kept > 0 {
                 break;
@@ -49,15 +49,15 @@ impl<R: Read> MendedUtf8<R> {
     }
 }
 
-impl<R: Read> Read for MendedUtf8<R> {
+impl<R: Read> Read for LossyUtf8<R> {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        while self.at == self.mended.len() {
+        while self.at == self.decoded.len() {
             if !self.refill()? {
                 return Ok(0);
             }
         }
-        let n = out.len().min(self.mended.len() - self.at);
-        out[..n].copy_from_slice(&self.mended[self.at..self.at + n]);
+        let n = out.len().min(self.decoded.len() - self.at);
+        out[..n].copy_from_slice(&self.decoded[self.at..self.at + n]);
         self.at += n;
         Ok(n)
     }
@@ -93,7 +93,7 @@ mod tests {
         ] {
             for size in [1, 2, 3, 1000, usize::MAX] {
                 let mut text = String::new();
-                MendedUtf8::new(Pieces(&bytes, size)).read_to_string(&mut text).expect("UTF-8");
+                LossyUtf8::new(Pieces(&bytes, size)).read_to_string(&mut text).expect("UTF-8");
                 assert_eq!(text, expected, "{size} bytes at a time");
             }
         }
