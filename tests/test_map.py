@@ -11,14 +11,19 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 
 
-@pytest.fixture(scope="module")
-def make_map() -> ModuleType:
+def load_make_map() -> ModuleType:
+    """Returns the module docs/make_map.py."""
     spec = importlib.util.spec_from_file_location("make_map", DOCS / "make_map.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def make_map() -> ModuleType:
+    return load_make_map()
 
 
 def test_the_map_is_that_of_the_files(make_map: ModuleType) -> None:
