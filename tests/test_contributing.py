@@ -24,8 +24,6 @@ def test_every_named_path_exists(row: str) -> None:
         path = find(name, folders)
         assert path is not None, f"{name} is neither in the repository nor in a folder named before it"
         folders += [path] if path.is_dir() else [path.parent]
-        # A file names the folder of its parts: beam.rs and beam/traversal.rs.
-        folders += [path.with_suffix("")] if path.with_suffix("").is_dir() else []
 
 
 def test_crates_depend_only_downwards() -> None:
