@@ -55,6 +55,9 @@ VERBS = [
     Verb(requests.Publish, "publish", properties("PublishArguments"), LibraryRendering.publish),
     Verb(requests.Export, "export"),
     Verb(requests.RemoveScene, "remove-scene", properties("RemoveArguments"), LibraryScene.remove),
+    Verb(requests.RemoveFiles, "remove-files", properties("RemoveArguments"), LibraryScene.remove_files),
+    Verb(requests.RemoveRendering, "remove-rendering", properties("RemoveArguments"), LibraryRendering.remove),
+    Verb(requests.RemovePublished, None, properties("RemoveArguments")),
     Verb(requests.Site, "site"),
 ]
 COMMON = {"workspace", "as_json", "yes", "with_stats", "help"}

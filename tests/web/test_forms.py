@@ -81,3 +81,19 @@ def test_more_options_reach_the_operation_and_the_rendering(town):
     steps = catalogue.scene("plain").options
     catalogue.close()
     assert (steps["merge_faces"], steps["drop_untextured"], steps["merge_vertices"]) == (False, True, True)
+
+
+def test_a_field_that_cannot_be_read_shows_the_form_again(town):
+    sent = {"name": "kept", "layer": ["color", "ao"], "radius_m": "wide", "quality": "70", "pitch": "60"}
+    answer = town.post("/studio/scenes/town/renderings/new", **sent)
+    text = unescape(answer.text)
+    assert answer.status_code == 400
+    assert "radius_m is 'wide', expected a number" in text
+    found = Controls(text).found
+    assert (found["name"][0], found["radius_m"][0], found["quality"][0], float(found["pitch"][0])) == ("kept", "wide", "70", 60)
+    catalogue = town.workspace.open_catalogue()
+    create_rendering(town.workspace, catalogue, CreateRendering(scene="town", name="r", levels=1))
+    catalogue.close()
+    published = town.post("/studio/renderings/r/publish", folder="Not a name")
+    assert published.status_code == 400
+    assert "Not a name" in unescape(published.text)

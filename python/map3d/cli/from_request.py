@@ -62,7 +62,7 @@ def request_option(request: type, name: str, **settings: Any) -> Callable[[Comma
 def _parameter(request: type, one: RequestField, settings: Mapping[str, Any]) -> Callable[[Command], Command]:
     if one.param.argument:
         return click.argument(one.name, **{"type": _type(one), **settings})
-    names = one.option.split("/") if one.option.startswith("-o/") else [one.option]
+    names = [one.option] if one.kind is bool else one.option.split("/")
     return click.option(*names, one.name, **{**_settings(request, one), **settings})
 
 

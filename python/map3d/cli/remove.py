@@ -12,7 +12,7 @@ from map3d.cli.from_request import request_options
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import names_text, plural, print_json, size_text
 from map3d.cores import usable_cores
-from map3d.requests import RemoveScene
+from map3d.requests import RemoveFiles, RemoveScene
 
 if TYPE_CHECKING:
     from map3d.publish.published_folders import PublishedFolder
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 @click.command("remove-files")
 @click.argument("scene")
-@click.argument("names", nargs=-1, required=True, metavar="NAME…")
+@request_options(RemoveFiles, names={"nargs": -1, "required": True, "metavar": "NAME…", "type": str})
 @yes_option
 @json_option
 @workspace_option
-def remove_files(workspace: Workspace, scene: str, names: Sequence[str], yes: bool, as_json: bool) -> None:
+def remove_files(workspace: Workspace, scene: str, request: RemoveFiles, yes: bool, as_json: bool) -> None:
     """Remove imported files from SCENE, by the names that map3d show scene SCENE lists or by file name. The source files stay.
 
     The scene is built again, so that the space of its meshes and textures is freed; the next map3d render removes the objects from the tiles. The ids
@@ -38,7 +38,7 @@ def remove_files(workspace: Workspace, scene: str, names: Sequence[str], yes: bo
         for record in catalogue.renderings(scene):
             expire_dead_workers(catalogue, record.name)
         before = folder_bytes(workspace.scene_folder(scene))
-        found = find_files(workspace, catalogue, scene, names)
+        found = find_files(workspace, catalogue, scene, request.names)
         if found.names:
             files = f"{plural(len(found.names), 'file')} ({names_text(found.names)})"
             confirm(f"this removes {files} from the scene {scene}, {size_text(found.bytes)} and the built files that only they use", yes=yes)

@@ -5,12 +5,22 @@ from functools import cache
 from typing import Any, Final
 
 from map3d.errors import BadRequest
-from map3d.requests import AddFiles, Build, Publish, RemoveScene, Render
+from map3d.requests import AddFiles, Build, Publish, Render
 from map3d.requests.json_values import schemas_of
-from map3d.requests.publications import FOLDER_NAME
+from map3d.requests.param import fields_of
+from map3d.requests.removals import REMOVALS
 
-_WITH_RENDERINGS: Final = schemas_of(RemoveScene)["with_renderings"]
 _NAMES: Final = {"type": "array", "items": {"type": "string"}, "minItems": 1}
+_REMOVAL_FIELDS: Final = {
+    name: [what for what, request in REMOVALS.items() if name in schemas_of(request)] for one in REMOVALS.values() for name in schemas_of(one)
+}
+"""Field of a removal → what has it."""
+
+
+def _removal_schema(name: str, whats: list[str]) -> dict[str, Any]:
+    schema = schemas_of(REMOVALS[whats[0]])[name]
+    return {**schema, "description": f"{', '.join(whats)}: {schema['description']}"}
+
 
 ARGUMENTS: Final[Mapping[str, Mapping[str, Any]]] = {
     "import": {
@@ -48,20 +58,8 @@ ARGUMENTS: Final[Mapping[str, Mapping[str, Any]]] = {
         "required": ["what"],
         "description": "Removes a scene, some of its files, a rendering, or a published folder of it. The target is the scene or the rendering.",
         "properties": {
-            "what": {"type": "string", "enum": ["scene", "files", "rendering", "published"]},
-            "names": {**_NAMES, "description": "files: names of assets."},
-            "folder": {
-                "type": "string",
-                "pattern": FOLDER_NAME,
-                "description": "published: name of the folder in the workspace's folder published/.",
-            },
-            "with_renderings": {**_WITH_RENDERINGS, "description": f"scene: {_WITH_RENDERINGS['description']}"},
-            "folders": {
-                "type": "array",
-                "items": {"type": "string", "pattern": FOLDER_NAME},
-                "description": "rendering, scene: names of the published folders to remove too; the others stay. "
-                "Needed if the renderings are published, even if the list is empty.",
-            },
+            "what": {"type": "string", "enum": list(REMOVALS)},
+            **{name: _removal_schema(name, whats) for name, whats in _REMOVAL_FIELDS.items()},
         },
     },
 }
@@ -75,14 +73,17 @@ def check_arguments(kind: str, target: str, arguments: Mapping[str, Any]) -> Non
     error = next(_validator(kind).iter_errors(dict(arguments)), None)
     if error is not None:
         raise BadRequest(f"operation {kind} {target}: arguments{place_of(error)}: {error.message[:300]}")
-    if kind == "remove" and (arguments["what"] == "files") != ("names" in arguments):
-        raise BadRequest(f"operation remove {target}: give names to remove files, and only then")
-    if kind == "remove" and (arguments["what"] == "published") != ("folder" in arguments):
-        raise BadRequest(f"operation remove {target}: give folder to remove a published folder, and only then")
-    if kind == "remove" and "folders" in arguments and arguments["what"] not in ("rendering", "scene"):
-        raise BadRequest(f"operation remove {target}: give folders only to remove a rendering or a scene")
+    if kind == "remove":
+        _check_removal(target, arguments)
     if kind == "import" and not {"files", "paths"} & set(arguments):
         raise BadRequest(f"operation import {target}: give files (ids of uploads) or paths")
+
+
+def _check_removal(target: str, arguments: Mapping[str, Any]) -> None:
+    for name, whats in _REMOVAL_FIELDS.items():
+        required = fields_of(REMOVALS[whats[0]])[name].required
+        if (name in arguments and arguments["what"] not in whats) or (required and name not in arguments and arguments["what"] in whats):
+            raise BadRequest(f"operation remove {target}: give {name} to remove {' or '.join(whats)}, and only then")
 
 
 def place_of(error: Any) -> str:

@@ -3,8 +3,9 @@ keywords and fields are views of it, and tests/requests compares them."""
 
 from map3d.requests.publications import Export, Publish
 from map3d.requests.reading import AddFiles, Inspect
+from map3d.requests.removals import RemoveFiles, RemovePublished, RemoveRendering, RemoveScene
 from map3d.requests.renderings import AddLayers, AddViews, CreateRendering, Estimate, LayerDetails, Render
-from map3d.requests.scenes import Build, CreateScene, RemoveScene
+from map3d.requests.scenes import Build, CreateScene
 from map3d.requests.site import Site
 
 __all__ = [
@@ -19,6 +20,9 @@ __all__ = [
     "Inspect",
     "LayerDetails",
     "Publish",
+    "RemoveFiles",
+    "RemovePublished",
+    "RemoveRendering",
     "RemoveScene",
     "Render",
     "Site",

@@ -87,7 +87,9 @@ def _schema(request: type, one: RequestField) -> dict[str, Any]:
     schema: dict[str, Any] = {**_kind(one).schema, "description": help_text(request, one.name, "rest") + (f" By default {words}." if words else "")}
     if known.choices:
         schema["enum"] = list(known.choices)
-    if known.pattern:
+    if known.pattern and "items" in schema:
+        schema["items"] = {**schema["items"], "pattern": known.pattern}
+    elif known.pattern:
         schema["pattern"] = known.pattern
     least, most = ("minItems", "maxItems") if schema.get("type") == "array" else ("minimum", "maximum")
     schema |= {name: limit for name, limit in ((least, known.minimum), (most, known.maximum)) if limit is not None}

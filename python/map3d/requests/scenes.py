@@ -1,4 +1,4 @@
-"""Requests about scenes: create, build, remove."""
+"""Requests about scenes: create, build."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -103,8 +103,3 @@ class CreateScene(ContentChoice, BuildSteps):
 @dataclass(frozen=True, kw_only=True)
 class Build(ContentChoice, WorkLimits):
     """Builds a scene if its files, or what it keeps of them, have changed."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class RemoveScene:
-    with_renderings: bool = param(False, help="Remove its renderings too.", lacks={"studio": "the page names the renderings that go with the scene"})

@@ -1,7 +1,7 @@
 """The form of a new rendering, and the query of a preview."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import date, datetime
 from typing import Any, Final
@@ -25,7 +25,8 @@ _SUN: Final = SunAngles(160.0, 45.0)
 @dataclass(frozen=True)
 class RenderingForm:
     """The fields as the user left them; `request` checks them. `layers` never has the kind data: `data` says how normal, id and depth are stored.
-    `res_m`: None for a number of levels, which is in `more`, as the REST API takes it."""
+    `res_m`: None for a number of levels, which is in `more`, as the REST API takes it. `problem`: what is wrong with the first field that cannot be
+    read, which has its default here; empty if there is none."""
 
     name: str
     title: str
@@ -37,9 +38,12 @@ class RenderingForm:
     time: str
     day: str
     more: Mapping[str, Any] = field(default_factory=dict)
+    problem: str = ""
 
     def request(self, scene: str, name: str) -> CreateRendering:
         """Raises BadRequest."""
+        if self.problem:
+            raise BadRequest(self.problem)
         values = {"scene": scene, "name": name, "title": self.title, "directions": self.directions, "pitch": self.pitch_deg, **self.more}
         return from_json(CreateRendering, values, res_m=self.res_m, layers=self.stored_layers, **self._light())
 
@@ -75,21 +79,38 @@ class PreviewQuery:
 
 
 def read_form(fields: Any) -> RenderingForm:
-    """Reads a form or query; missing fields get their defaults. Raises BadRequest for numbers that are not."""
+    """Reads a form or query; missing fields, and those that cannot be read, get their defaults."""
     layers = tuple(kind for kind in LAYER_KINDS if kind in fields.getlist("layer") and kind != "data") or LAYERS_BY_DATA["png"]
-    data, more = fields.get("data"), more_values(CreateRendering, fields)
+    data, problems = fields.get("data"), _Problems()
+    more = problems.without(lambda: more_values(CreateRendering, fields), {})
+    res_m = None if "levels" in more else problems.without(lambda: _number(fields, "res", DEFAULT_RES_M, 0.001, 1e6), DEFAULT_RES_M)
     return RenderingForm(
         name=fields.get("name", "").strip(),
         title=fields.get("title", "").strip(),
-        directions=round(_number(fields, "directions", 4, 1, 360)),
-        pitch_deg=_number(fields, "pitch", 45, 1, 90),
-        res_m=None if "levels" in more else _number(fields, "res", DEFAULT_RES_M, 0.001, 1e6),
+        directions=round(problems.without(lambda: _number(fields, "directions", 4, 1, 360), 4)),
+        pitch_deg=problems.without(lambda: _number(fields, "pitch", 45, 1, 90), 45),
+        res_m=res_m,
         layers=layers,
         data=data if data in LAYERS_BY_DATA else DEFAULT_DATA,
         time=fields.get("time", "").strip(),
         day=fields.get("day", "").strip(),
         more=more,
+        problem=problems.first,
     )
+
+
+class _Problems:
+    """Remembers the first problem of several reads."""
+
+    first = ""
+
+    def without(self, read: Callable[[], Any], default: Any) -> Any:
+        """Returns what `read` returns, or the default if it raises BadRequest."""
+        try:
+            return read()
+        except BadRequest as error:
+            self.first = self.first or str(error)
+            return default
 
 
 def read_preview(fields: Mapping[str, str]) -> PreviewQuery:

@@ -39,7 +39,8 @@ PREVIEW_AGE_S: Final = 300
 @requires("editor")
 def new_rendering(scene: str) -> Response:
     """Shows the form; without JavaScript, its button "Update preview" shows it again with other pictures."""
-    return _form_page(scene, read_form(request.args), "")
+    form = read_form(request.args)
+    return _form_page(scene, form, form.problem)
 
 
 @rendering_pages.post("/scenes/<scene>/renderings/new")
@@ -81,17 +82,7 @@ def estimate(scene: str) -> Response:
 @rendering_pages.get("/renderings/<rendering>")
 @requires("viewer")
 def rendering_page(rendering: str) -> Response:
-    record = catalogue().rendering(check_name(rendering, "rendering"))
-    found = catalogue().operations(scene=record.scene, limit=50)
-    operations = show_all([one for one in found if _is_about(one, rendering)][:OPERATIONS])
-    running = any(one.state in ("waiting", "running") for one in operations)
-    counts = {str(state): count for state, count in catalogue().count_jobs(rendering).items()}
-    values: dict[str, Any] = {"operations": operations, "running": running, "counts": counts, "jobs": sum(counts.values())}
-    quarantine = list(islice(catalogue().jobs(rendering, state=State.QUARANTINED), QUARANTINED))
-    has_map = read_manifest(workspace(), record) is not None
-    values |= {"rendering": record, "scene": catalogue().scene(record.scene), "folders": published_folders(workspace(), rendering)}
-    values |= {"more": more_controls(Publish, MultiDict())}
-    return page("rendering.html", **values, quarantine=quarantine, has_map=has_map, changed=has_map and _is_changed(record, found))
+    return _rendering_page(rendering, MultiDict())
 
 
 @rendering_pages.post("/renderings/<rendering>/render")
@@ -106,7 +97,10 @@ def render(rendering: str) -> Response:
 @requires("editor")
 def publish(rendering: str) -> Response:
     catalogue().rendering(check_name(rendering, "rendering"))
-    ask("publish", rendering, **form_values(Publish, request.form))
+    try:
+        ask("publish", rendering, **form_values(Publish, request.form))
+    except BadRequest as error:
+        return _rendering_page(rendering, request.form, str(error), 400)
     return go_to(f"studio/renderings/{rendering}")
 
 
@@ -144,6 +138,21 @@ def send_remove(rendering: str) -> Response:
         return _removal_page(rendering, str(error), 400)
     ask("remove", rendering, what="rendering", folders=request.form.getlist("published"))
     return go_to(f"studio/scenes/{record.scene}")
+
+
+def _rendering_page(rendering: str, sent: MultiDict[str, str], problem: str = "", status: int = 200) -> Response:
+    """`sent`: the form of a publication with a `problem`."""
+    record = catalogue().rendering(check_name(rendering, "rendering"))
+    found = catalogue().operations(scene=record.scene, limit=50)
+    operations = show_all([one for one in found if _is_about(one, rendering)][:OPERATIONS])
+    running = any(one.state in ("waiting", "running") for one in operations)
+    counts = {str(state): count for state, count in catalogue().count_jobs(rendering).items()}
+    values: dict[str, Any] = {"operations": operations, "running": running, "counts": counts, "jobs": sum(counts.values())}
+    quarantine = list(islice(catalogue().jobs(rendering, state=State.QUARANTINED), QUARANTINED))
+    has_map = read_manifest(workspace(), record) is not None
+    values |= {"rendering": record, "scene": catalogue().scene(record.scene), "folders": published_folders(workspace(), rendering)}
+    values |= {"more": more_controls(Publish, sent), "problem": problem}
+    return page("rendering.html", status, **values, quarantine=quarantine, has_map=has_map, changed=has_map and _is_changed(record, found))
 
 
 def _folder_removal_page(rendering: str, folder: str, problem: str = "", status: int = 200) -> Response:
