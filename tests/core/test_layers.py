@@ -1,4 +1,4 @@
-"""What holds for every row of spec/layers.json. A place that a new kind lacks fails here (docs/layers.md, "Adding a kind of layer")."""
+"""What holds for every row of spec/layers.json. A place that a new kind lacks fails here (docs/recipes.md)."""
 
 import io
 import json
