@@ -27,7 +27,7 @@ def test_every_named_path_exists(row: str) -> None:
 
 
 def test_crates_depend_only_downwards() -> None:
-    line = next(line for line in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").splitlines() if line.startswith("* Rust:"))
+    line = next(line for line in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").splitlines() if "Of the crates," in line)
     chains = [chain.split(" > ") for chain in re.findall(r"`(\w+(?: > \w+)+)`", line)]
     below: dict[str, set[str]] = {}
     for upper, lower in ((upper, lower) for chain in chains for k, upper in enumerate(chain) for lower in chain[k + 1 :]):
@@ -40,5 +40,5 @@ def test_crates_depend_only_downwards() -> None:
 
 
 def test_the_table_is_read() -> None:
-    assert len(ROWS) > 40
-    assert sum(len(PATH.findall(row)) for row in ROWS) > 80
+    assert len(ROWS) == 10
+    assert sum(len(PATH.findall(row)) for row in ROWS) > 30
