@@ -1,7 +1,6 @@
-"""The table of CONTRIBUTING.md names files and folders that exist, and the crates import in its directions."""
+"""The table of CONTRIBUTING.md names files and folders that exist."""
 
 import re
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -24,19 +23,6 @@ def test_every_named_path_exists(row: str) -> None:
         path = find(name, folders)
         assert path is not None, f"{name} is neither in the repository nor in a folder named before it"
         folders += [path] if path.is_dir() else [path.parent]
-
-
-def test_crates_depend_only_downwards() -> None:
-    line = next(line for line in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").splitlines() if "Of the crates," in line)
-    chains = [chain.split(" > ") for chain in re.findall(r"`(\w+(?: > \w+)+)`", line)]
-    below: dict[str, set[str]] = {}
-    for upper, lower in ((upper, lower) for chain in chains for k, upper in enumerate(chain) for lower in chain[k + 1 :]):
-        below.setdefault(upper, set()).update({lower}, below.get(lower, set()))
-    for manifest in (ROOT / "crates").glob("*/Cargo.toml"):
-        name = manifest.parent.name.removeprefix("map3d-")
-        used = {one.removeprefix("map3d-") for one in tomllib.loads(manifest.read_text())["dependencies"] if one.startswith("map3d-")}
-        assert used <= below.get(name, set()), f"{name} depends on {used - below.get(name, set())}"
-    assert "build" not in below["trace"]
 
 
 def test_the_table_is_read() -> None:

@@ -1,7 +1,8 @@
-"""docs/map.md is that of the files, every file describes itself, and docs/architecture.md names files that exist."""
+"""docs/map.md is that of the files, every file describes itself, and docs/architecture.md names the floors of the linters and files that exist."""
 
 import importlib.util
 import re
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
@@ -37,7 +38,40 @@ def test_every_module_describes_itself(make_map: ModuleType) -> None:
     assert [str(path) for path in files if not make_map.description(path)] == []
 
 
-def test_the_architecture_names_files_that_exist() -> None:
-    named = re.findall(r"`((?:crates|python|viewer|spec)/[\w./-]+)`", (DOCS / "architecture.md").read_text(encoding="utf-8"))
+@pytest.fixture(scope="module")
+def architecture() -> str:
+    return (DOCS / "architecture.md").read_text(encoding="utf-8")
+
+
+def test_the_architecture_names_files_that_exist(architecture: str) -> None:
+    named = re.findall(r"`((?:crates|python|viewer|spec)/[\w./-]+)`", architecture)
     assert len(named) > 30
     assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def chain(floors: list[str]) -> str:
+    """Returns the floors of a contract of import-linter as the architecture writes those of a folder."""
+    names = [[name.strip().rpartition(".")[2] for name in floor.split("|")] for floor in floors]
+    return " > ".join(one[0] if len(one) == 1 else f"{{{', '.join(one)}}}" for one in names)
+
+
+def test_the_floors_are_those_of_the_linter(architecture: str) -> None:
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
+    layers = {one["name"]: one.get("layers", []) for one in contracts}
+    picture = re.findall(r"```text\n[^\n]*\n\n(.*?)```", architecture, re.DOTALL)[0]
+    assert [re.split(r"\s{2,}", line.strip())[1] for line in picture.splitlines()] == [
+        one.replace("map3d.", "") for one in layers["Imports go down only"]
+    ]
+    assert f"`{chain(layers['The HTTP front imports down only'])}`" in architecture
+
+
+def test_the_crates_depend_on_each_other_as_drawn(architecture: str) -> None:
+    below: dict[str, set[str]] = {}
+    for upper, lower in reversed(re.findall(r"  (\w+) --> (\w+)", architecture)):
+        below.setdefault(upper, set()).update({lower}, below.get(lower, set()))
+    manifests = {path.parent.name.removeprefix("map3d-"): tomllib.loads(path.read_text()) for path in (ROOT / "crates").glob("*/Cargo.toml")}
+    for name, manifest in manifests.items():
+        used = {one.removeprefix("map3d-") for one in manifest["dependencies"] if one.startswith("map3d-")}
+        assert used <= below.get(name, set()), f"{name} depends on {used - below.get(name, set())}"
+    assert set(manifests) == {*below, "base"}
+    assert "build" not in below["trace"]
