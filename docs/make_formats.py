@@ -146,7 +146,7 @@ def _not_drawn(found: Mapping[str, Any], folder: Path) -> Iterator[str]:
         without.update({kind["kind"].replace("_", " "): kind["count"] - kind["drawn"] for kind in file["kinds"] if kind["count"] > kind["drawn"]})
     yield from (f"{count:,} × {code}" for code, count in skipped.most_common())
     yield from (f"{count:,} {kind} without geometry" for kind, count in without.most_common())
-    reasons = Counter(_plain(reason.removeprefix(f"{path}: "), folder, Path(path).name) for path, reason in [*found["failed"], *found["left_alone"]])
+    reasons = Counter(_plain(reason.removeprefix(f"{path}: "), folder, Path(path).name) for path, reason in [*found["failed"], *found["ignored"]])
     for reason, count in reasons.most_common(MAX_REASONS):
         yield f"{_count(count, 'file')}: {reason}"
     if len(reasons) > MAX_REASONS:

@@ -13,7 +13,7 @@ from babel.units import format_unit
 
 
 @dataclass(frozen=True)
-class Style:
+class LocaleFormats:
     """`locale`, `date` and `moment`: a locale and patterns of the CLDR. `space`: what separates a number from `%`, `s`, `min` and `h`."""
 
     locale: str
@@ -22,10 +22,10 @@ class Style:
     space: str
 
 
-STYLES: Final[Mapping[str, Style]] = {
-    "en": Style("en_GB", "d MMMM y", "d MMMM y, HH:mm 'UTC'", " "),
-    "de": Style("de", "d. MMM y", "d. MMM y, HH:mm 'UTC'", "\N{NO-BREAK SPACE}"),
-    "fr": Style("fr", "d MMM y", "d MMM y, HH:mm 'UTC'", "\N{NARROW NO-BREAK SPACE}"),
+STYLES: Final[Mapping[str, LocaleFormats]] = {
+    "en": LocaleFormats("en_GB", "d MMMM y", "d MMMM y, HH:mm 'UTC'", " "),
+    "de": LocaleFormats("de", "d. MMM y", "d. MMM y, HH:mm 'UTC'", "\N{NO-BREAK SPACE}"),
+    "fr": LocaleFormats("fr", "d MMM y", "d MMM y, HH:mm 'UTC'", "\N{NARROW NO-BREAK SPACE}"),
 }
 _SIZES: Final = ("kilobyte", "megabyte", "gigabyte")
 

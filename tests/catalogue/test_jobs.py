@@ -103,7 +103,7 @@ def test_jobs_of_all_tracks_are_leased_along_the_ground(catalogue: Catalogue) ->
     assert {(job.track, job.block.x): job.ground for job in catalogue.jobs("town-a")} == grounds
 
 
-def test_a_changed_block_takes_the_ground_number_of_the_new_plan(catalogue: Catalogue) -> None:
+def test_a_changed_block_takes_the_hilbert_index_of_the_new_plan(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base(ground=3)])
     catalogue.plan("town-a", [base(key="changed", ground=4)])
     assert only(catalogue).ground == 4
@@ -119,7 +119,7 @@ def test_reduce_jobs_come_before_base_jobs_of_any_ground(catalogue: Catalogue) -
     assert (second.kind, second.block) == ("reduce", TOP)
 
 
-def test_lease_starts_at_a_ground_number_and_wraps_around(catalogue: Catalogue) -> None:
+def test_lease_starts_at_a_hilbert_index_and_wraps_around(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [reduce(), *(base(x, ground=x) for x in range(4))])
     third = 2
     taken = [catalogue.lease("town-a", "w", third) for _ in range(4)]

@@ -176,8 +176,8 @@ def test_catalogue_of_a_newer_version_is_refused(new_url: NewUrl, mongo_server: 
         open_catalogue(url)
 
 
-def test_an_unfinished_rendering_of_version_1_goes_on(new_url: NewUrl, mongo_server: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Version 1 had no ground numbers. The migration is repeated, as after a kill."""
+def test_an_unfinished_rendering_of_version_1_resumes(new_url: NewUrl, mongo_server: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Version 1 had no Hilbert indices. The migration is repeated, as after a kill."""
     monkeypatch.setattr(mongodb_connection, "MIGRATED_BATCH", 3)
     url = new_url()
     catalogue = open_catalogue(url)

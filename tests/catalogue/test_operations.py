@@ -328,7 +328,7 @@ def test_operation_that_always_loses_its_worker_fails(catalogue: Catalogue) -> N
         assert catalogue.expire_operations(["w"]) == 1
     assert catalogue.lease_operation("w") is None
     failed = catalogue.operation(id)
-    assert (failed.state, failed.message.startswith(f"its worker ended {MAX_EXPIRIES} times")) == (FAILED, True)
+    assert (failed.state, failed.message.startswith(f"the worker died {MAX_EXPIRIES} times")) == (FAILED, True)
     catalogue.retry_operation(id)
     take(catalogue)
     catalogue.expire_operations(["w"])

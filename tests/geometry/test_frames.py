@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from map3d.errors import BadRequest, LimitExceeded, OutsideFrame
-from map3d.geometry.frames import NO_DEPTH, Window, check_content, corners, pin, pin_beside
+from map3d.geometry.frames import NO_DEPTH, Window, check_content, corners, pin, pin_into
 from map3d.geometry.views import uvd_from_local
 from map3d.types import Layer, Sun, TileId, ViewAngles
 
@@ -94,7 +94,7 @@ def test_content_nearer_than_depth_zero_is_outside():
 def test_a_view_that_joins_takes_over_the_size():
     first = pin(BOX, 256, 0.2, [ViewAngles(0, 45)])[0]
     both = pin(BOX, 256, 0.2, [ViewAngles(0, 45), ViewAngles(90, 45)])
-    assert pin_beside(first, BOX, ViewAngles(90, 45)) == both[1]
+    assert pin_into(first, BOX, ViewAngles(90, 45)) == both[1]
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ def test_a_view_that_joins_a_window_takes_over_its_middle_and_side():
     window = Window(100.0, 0.0, 300.0)
     first = pin(SCENE, 256, 0.25, [ViewAngles(0, 45)], window)[0]
     both = pin(SCENE, 256, 0.25, [ViewAngles(0, 45), ViewAngles(90, 30)], window)
-    assert pin_beside(first, SCENE, ViewAngles(90, 30), window) == both[1]
+    assert pin_into(first, SCENE, ViewAngles(90, 30), window) == both[1]
 
 
 @pytest.mark.parametrize("numbers", [(0, 0, 0), (0, 0, -1), (0, 0, math.inf), (math.nan, 0, 1), (0, math.inf, 1)])

@@ -106,12 +106,12 @@ def test_an_ascii_grid_may_have_wide_columns(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", sorted({suffix for format in RASTER_FORMATS for suffix in format.world_files}))
-def test_world_files_are_not_listed_as_left_alone(tmp_path: Path, suffix: str) -> None:
+def test_world_files_are_not_listed_as_ignored(tmp_path: Path, suffix: str) -> None:
     write(tmp_path / "dem.tif", hills(4, 4))
     (tmp_path / f"dem{suffix}").write_text("1\n0\n0\n-1\n0\n0\n")
-    left_alone: list[Path] = []
-    find_sources([tmp_path], on_left_alone=lambda path, _: left_alone.append(path))
-    assert left_alone == []
+    ignored: list[Path] = []
+    find_sources([tmp_path], on_ignored=lambda path, _: ignored.append(path))
+    assert ignored == []
 
 
 @pytest.mark.parametrize(("name", "driver"), [("a.ecw", "ECW"), ("a.sid", "MrSID"), ("a.IMG", "HFA")])

@@ -142,7 +142,7 @@ def test_a_document_of_heights_alone_is_terrain(tmp_path: Path) -> None:
     write_raster(city / "dem.tif")
     done, boxes = add(tmp_path, [write_model(city / "town.gml", house="")])
     assert [item.asset for item in done.imported] == ["dem"]
-    assert done.left_alone == [(str(city / "town.gml"), "a grid of heights alone, which is read as terrain")]
+    assert done.ignored == [(str(city / "town.gml"), "a grid of heights alone, which is read as terrain")]
     assert np.array_equal(boxes["dem"], GRID_BOX)
 
 
@@ -218,4 +218,4 @@ def test_a_site_imports_the_raster_again_when_its_grid_changes(tmp_path: Path) -
     write_model(city / "town.gml", house="", origin=(EAST + 100.0, NORTH))
     summary = update(workspace, city)
     assert summary.unchanged == ["dem"]
-    assert summary.left_alone == [("town.gml", "a grid of heights alone, which is read as terrain")]
+    assert summary.ignored == [("town.gml", "a grid of heights alone, which is read as terrain")]

@@ -119,7 +119,7 @@ def test_unreadable_files_with_a_known_suffix_are_reported(tmp_path: Path) -> No
     assert [why.partition(";")[0].rpartition(": ")[2] for _, why in reported] == ["an empty file", "a file of unknown format"]
 
 
-def test_code_lists_that_a_file_names_are_not_left_alone(tmp_path: Path) -> None:
+def test_code_lists_that_a_file_names_are_not_ignored(tmp_path: Path) -> None:
     (tmp_path / "udx").mkdir()
     (tmp_path / "codelists").mkdir()
     uses = "".join(f"<usage codeSpace='../codelists/{name}'>1</usage>" for name in ("used.xml", "Named%20so.gml", "../../outside.xml"))

@@ -179,7 +179,7 @@ def test_one_that_a_web_user_uploads_is_refused(workspace: Workspace, catalogue:
         add(workspace, catalogue, virtual, options=ImportOptions())
     done = add(workspace, catalogue, city, options=ImportOptions())
     assert [item.asset for item in done.imported] == ["dem"]
-    ((path, reason),) = done.left_alone
+    ((path, reason),) = done.ignored
     assert (os.path.basename(path), "virtual raster" in reason) == ("dem.vrt", True)
 
 
@@ -190,7 +190,7 @@ def test_one_in_an_archive_is_refused_even_if_the_operator_gives_it(workspace: W
         archive.write(city / "tiles" / "dem.tif", "tiles/dem.tif")
     done = add(workspace, catalogue, city.parent / "city.zip")
     assert [item.source.endswith("dem.tif") for item in done.imported] == [True]
-    assert len(done.left_alone) == 1
+    assert len(done.ignored) == 1
 
 
 def test_a_site_reads_one_and_notices_changed_tiles(workspace: Workspace, catalogue: Catalogue, city: Path) -> None:

@@ -60,7 +60,7 @@ def test_render_waits_for_a_locked_catalogue(tmp_path: Path, faults: Path) -> No
     assert (workspace.manifest_path("r").read_bytes(), stored(workspace)) == expected
 
 
-def test_render_of_a_catalogue_that_stays_locked_ends_clearly_and_goes_on(tmp_path: Path, faults: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_render_of_a_catalogue_that_stays_locked_ends_clearly_and_resumes(tmp_path: Path, faults: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     expected, workspace = undisturbed(tmp_path), make_workspace(tmp_path / "workspace")
     monkeypatch.setattr("map3d.database.BUSY_TIMEOUT_S", 0.2)
     with locked(workspace), pytest.raises(StoreError, match="locked"):

@@ -74,7 +74,7 @@ def test_a_block_is_rendered_and_stored(town: Town, faults: Path, start: Callabl
     ask(town, one, base(town, 5)).ended.result(WAIT_S)
     assert job_of(town, base(town, 5)).state is State.DONE
     assert is_stored(town, base(town, 5))
-    assert (rendered(faults), town.count(State.DONE), one.cache.places()) == (1, 1, [("town-a", VIEW, base(town, 5))])
+    assert (rendered(faults), town.count(State.DONE), one.cache.addresses()) == (1, 1, [("town-a", VIEW, base(town, 5))])
 
 
 def test_the_tiles_are_those_of_an_ordinary_render(town: Town, start: Callable[..., OnDemand], tmp_path: Path) -> None:
@@ -202,7 +202,7 @@ def test_the_least_recently_used_blocks_are_evicted(town: Town, start: Callable[
         ask(town, one, base(town, x)).ended.result(WAIT_S)
     one.cache.touch([("town-a", VIEW, base(town, 0))])
     ask(town, one, base(town, 3)).ended.result(WAIT_S)
-    assert [place[2].x for place in one.cache.places()] == [2, 0, 3]
+    assert [place[2].x for place in one.cache.addresses()] == [2, 0, 3]
     assert one.cache.used_bytes() <= 3 * sizes(town)
     assert (job_of(town, base(town, 1)).state, is_stored(town, base(town, 1))) == (State.TODO, False)
     assert all(is_stored(town, base(town, x)) for x in (0, 2, 3))
@@ -276,5 +276,5 @@ def test_an_eviction_that_is_killed_can_be_repeated(town: Town, start: Callable[
     town.catalogue.expire("town-a", ["killed"])
     cache.reserve(lease, size)
     assert (job_of(town, base(town, 0)).state, is_stored(town, base(town, 0))) == (State.TODO, False)
-    assert cache.places() == [("town-a", VIEW, base(town, 1))]
+    assert cache.addresses() == [("town-a", VIEW, base(town, 1))]
     cache.close()

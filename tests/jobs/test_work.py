@@ -211,7 +211,7 @@ def test_work_without_names_does_all_renderings(tmp_path: Path, faults: Path) ->
     assert all(Manifest.load(workspace.manifest_path(name).read_bytes()).complete for name in ("r", "t"))
 
 
-def test_work_that_waits_for_ever_does_what_is_planned_later(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_work_that_waits_forever_does_what_is_planned_later(workspace: Workspace, catalogue: Catalogue) -> None:
     plan(workspace, catalogue)
     worker = Work(workspace, catalogue, SETTINGS, forever=True)
     left: list[RunEvent] = []
@@ -293,7 +293,7 @@ def test_work_drains_on_sigterm(workspace: Workspace, catalogue: Catalogue, faul
     assert {after[place].attempts for place in leased} == {2 - signals}
 
 
-def test_idle_work_that_waits_for_ever_ends_on_a_signal(workspace: Workspace, catalogue: Catalogue) -> None:
+def test_idle_work_that_waits_forever_ends_on_a_signal(workspace: Workspace, catalogue: Catalogue) -> None:
     plan(workspace, catalogue)
     process = start("forever", workspace)
     wait_for_line(process, "RenderingLeft")

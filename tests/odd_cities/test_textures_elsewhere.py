@@ -1,4 +1,4 @@
-"""Textures beside the folder of the document, inside the folder that was given; missing textures; files that are left alone."""
+"""Textures beside the folder of the document, inside the folder that was given; missing textures; ignored files."""
 
 import os
 from pathlib import Path
@@ -57,7 +57,7 @@ def test_nothing_outside_the_given_folder_is_read(tmp_path: Path, outside: str) 
     assert OBJ_FORMAT.find_missing(city / "models" / "town.obj", city).names == [outside]
 
 
-def test_site_counts_missing_textures_and_says_which_files_it_left_alone(tmp_path: Path, run: Run) -> None:
+def test_site_counts_missing_textures_and_says_which_files_it_ignored(tmp_path: Path, run: Run) -> None:
     city = write_town(tmp_path / "city")
     (city / "models" / "town.mtl").write_text("newmtl wall\nmap_Kd ../textures/wall.png\nmap_bump ../textures/none.png\n")
     (city / "other").mkdir()
@@ -71,12 +71,12 @@ def test_site_counts_missing_textures_and_says_which_files_it_left_alone(tmp_pat
     status, out, err = run("site", "city", "-o", "site", "--res", "1", "--view", "0-45", "--workers", "1")
     assert status == 0, err
     assert "1 of 2 textures missing, e.g. town: ../textures/none.png; they must be in the given folder or below\n" in out
-    assert "left alone, since map3d does not read it: other/a.json (CityJSON; convert it to CityGML with citygml-tools)\n" in out
-    assert "left alone, since map3d does not read it: other/points.las (a LAS point cloud)\n" in out
+    assert "ignored (unsupported format): other/a.json (CityJSON; convert it to CityGML with citygml-tools)\n" in out
+    assert "ignored (unsupported format): other/points.las (a LAS point cloud)\n" in out
     assert "imported 2 files" in out
     assert "settings.json" not in out
     assert "LICENSE" not in out
-    assert "left alone, since map3d does not read it: notes (a file of unknown format)\n" in out
+    assert "ignored (unsupported format): notes (a file of unknown format)\n" in out
 
 
 def test_site_has_the_options_of_an_import(tmp_path: Path, run: Run) -> None:

@@ -68,7 +68,7 @@ def test_operation_of_a_killed_worker_is_finished_by_another(
 
 
 @pytest.mark.parametrize("point", ["importing house-2.obj", "building", "rendering@1", "publishing tiles@1"])
-def test_cancelled_operation_stops_and_a_retry_goes_on(
+def test_cancelled_operation_stops_and_a_retry_resumes(
     point: str, scenario: Scenario, archive: Path, undisturbed: dict[str, bytes], reached: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cancelled = []

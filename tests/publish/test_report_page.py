@@ -42,7 +42,7 @@ REPORT = SiteReport(
     box=BOX,
     files=(TOWN, TERRAIN),
     failed=(("/data/cut.gml", "document broken at byte 17"),),
-    left_alone=(("town.json", "CityJSON"),),
+    ignored=(("town.json", "CityJSON"),),
     left_out=("left out 3 triangles",),
     views=("45-45",),
     res_m=0.1,
@@ -101,7 +101,7 @@ def test_the_page_accounts_for_everything() -> None:
         "2,468 building part (LoD 2)", "0.1 m per pixel, since finer pixels show nothing more", "took 4 min with 2 workers",
         "Skipped polygons without area: 7.town.gml: house-1", "The file breaks off; what comes before is kept.town.gml: 11.5 48.1",
         "left out 3 triangles",
-        "not importedcut.gmldocument broken at byte 17", "left alonetown.jsonCityJSON",
+        "not importedcut.gmldocument broken at byte 17", "ignoredtown.jsonCityJSON",
         "CityGML, 12.3 kB", "dem (5 rasters)", "4 rasters of elevation and 1 raster of imagery",
         "3 triangles far from the rest", "../textures/a.jpg, …",
     ):  # fmt: skip
@@ -129,7 +129,7 @@ def test_names_from_files_are_text() -> None:
     textures = Textures(646, 645, (HOSTILE,))
     town = replace(TOWN, asset=HOSTILE, source=HOSTILE, crs=HOSTILE, place=HOSTILE, kinds=kinds, textures=textures, findings=findings)
     hostile = replace(
-        REPORT, title=HOSTILE, crs=HOSTILE, place=HOSTILE, files=(town, TERRAIN), failed=((HOSTILE, HOSTILE),), left_alone=((HOSTILE, HOSTILE),),
+        REPORT, title=HOSTILE, crs=HOSTILE, place=HOSTILE, files=(town, TERRAIN), failed=((HOSTILE, HOSTILE),), ignored=((HOSTILE, HOSTILE),),
         left_out=(HOSTILE,), why=HOSTILE,
     )  # fmt: skip
     page = Elements(report_page(hostile, 4_000, 5_000_000))
@@ -140,7 +140,7 @@ def test_names_from_files_are_text() -> None:
 
 def test_a_map_without_problems_says_so() -> None:
     clean = replace(TOWN, findings=(), outside=0, textures=None)
-    text = Elements(report_page(replace(REPORT, files=(clean,), failed=(), left_alone=(), left_out=()), 1, 1)).text
+    text = Elements(report_page(replace(REPORT, files=(clean,), failed=(), ignored=(), left_out=()), 1, 1)).text
     assert "Nothing in the imported files was skipped, and there are no warnings." in text
     assert "Files that are not in the map" not in text
     assert "Skipped" not in text

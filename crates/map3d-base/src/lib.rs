@@ -4,10 +4,10 @@
 pub mod asset;
 pub mod camera;
 pub mod error;
-pub mod extent;
 pub mod file;
 pub mod frame;
 pub mod isa;
+pub mod kept_space;
 pub mod layers;
 pub mod limits;
 pub mod projection;
@@ -19,9 +19,9 @@ pub mod view;
 
 pub use camera::{Camera, CameraKind, Window};
 pub use error::{Error, Result};
-pub use extent::Extent;
 pub use frame::{Frame, LayerSpec};
 pub use isa::Isa;
+pub use kept_space::KeptSpace;
 pub use layers::{LayerFormat, LayerKind};
 pub use projection::{ParallelProjection, PerspectiveProjection, Projection};
 pub use reason::Reason;

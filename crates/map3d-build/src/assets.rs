@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use map3d_base::asset::{AssetMesh, Instance, Material, Materials};
-use map3d_base::{Error, Extent, Result};
+use map3d_base::{Error, KeptSpace, Result};
 use twox_hash::XxHash3_128;
 
 use crate::BuildRequest;
@@ -37,7 +37,7 @@ struct AssetEntry {
 
 impl Assets {
     /// Reads the digests of all assets without opening them; an asset whose summary is valid need not be opened.
-    pub fn load(folder: &Path, request: &BuildRequest, extent: Option<&Extent>) -> Result<Self> {
+    pub fn load(folder: &Path, request: &BuildRequest, extent: Option<&KeptSpace>) -> Result<Self> {
         let summaries_folder = folder.join(FOLDER);
         let mut out = Self { entries: Vec::new(), summaries_folder, previous: Vec::new() };
         for name in &request.assets {
@@ -138,7 +138,7 @@ impl Assets {
 }
 
 /// Hashes everything that a summary depends on except the keys of textures. The checksum in its header represents the mesh.
-fn compute_digest(folder: &Path, request: &BuildRequest, extent: Option<&Extent>) -> Result<String> {
+fn compute_digest(folder: &Path, request: &BuildRequest, extent: Option<&KeptSpace>) -> Result<String> {
     let mut hash = XxHash3_128::with_seed(u64::from(BUILD_FORMAT));
     let mut write = |bytes: &[u8]| {
         hash.write(&(bytes.len() as u64).to_le_bytes());

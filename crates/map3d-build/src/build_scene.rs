@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use map3d_base::{Box3, Error, Extent, Result, vec3};
+use map3d_base::{Box3, Error, KeptSpace, Result, vec3};
 use map3d_scene::index::{Cell, ChunkEntry, FILE, InstancesEntry, SceneIndex};
 use map3d_scene::instances;
 use map3d_scene::lattice::{MAX_EDGE_M, metres};
@@ -53,7 +53,7 @@ struct Build<'a> {
     folder: &'a Path,
     request: &'a BuildRequest,
     content: &'a Content,
-    extent: Option<&'a Extent>,
+    extent: Option<&'a KeptSpace>,
     textures: &'a TextureKeys,
     assets: Assets,
     report: BuildReport,
@@ -287,7 +287,7 @@ fn open_all<'a>(assets: &'a mut Assets, numbers: &[usize]) -> Result<Vec<&'a Ass
 
 fn triangle_source<'a>(
     request: &'a BuildRequest,
-    extent: Option<&'a Extent>,
+    extent: Option<&'a KeptSpace>,
     assets: &'a [&'a Asset],
     materials: &'a BuildMaterials,
 ) -> TriangleSource<'a> {
@@ -295,7 +295,7 @@ fn triangle_source<'a>(
 }
 
 /// Refuses scenes whose large triangles would become more small ones than any city has.
-fn check_triangle_count(folder: &Path, content: &Content, extent: Option<&Extent>) -> Result<()> {
+fn check_triangle_count(folder: &Path, content: &Content, extent: Option<&KeptSpace>) -> Result<()> {
     let got = content.added_by_splitting(extent, MAX_EDGE_M) as u64;
     let limit = || Error::Limit {
         path: folder.into(),

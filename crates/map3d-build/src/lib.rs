@@ -12,12 +12,12 @@ pub mod content;
 mod encode;
 mod files;
 mod ground;
-mod looks;
 mod materials;
 mod prototypes;
 mod report;
 mod request;
 mod summarize;
+mod surface_colors;
 mod textures;
 mod triangle;
 mod triangle_source;
@@ -25,9 +25,9 @@ mod unpack;
 
 pub use build_scene::build_scene;
 pub use encode::{ChunkFile, ChunkInput, encode_chunk};
-pub use looks::StyleRule;
 pub use report::BuildReport;
 pub use request::{BuildOptions, BuildRequest, GroundPlane};
+pub use surface_colors::StyleRule;
 pub use triangle::BuildTriangle;
 
 /// (stage, done, total) → false to stop.

@@ -10,7 +10,7 @@ use map3d_texture::TextureKeys;
 use crate::BuildOptions;
 use crate::asset_summary::record_hash;
 use crate::assets::Asset;
-use crate::looks::Looks;
+use crate::surface_colors::SurfaceColors;
 
 pub(crate) struct BuildMaterials {
     pub records: Vec<MaterialRecord>,
@@ -25,8 +25,8 @@ pub(crate) struct BuildMaterials {
 /// The asset's material → index into the records.
 struct AssetMaterials {
     numbers: Vec<MaterialNumber>,
-    looks: Looks,
-    /// By look and surface class.
+    colors: SurfaceColors,
+    /// By palette and surface class.
     colored: Vec<[u32; SurfaceClass::ALL.len()]>,
 }
 
@@ -50,12 +50,12 @@ impl BuildMaterials {
                 None => MaterialNumber::Own(out.add(record_of(m, textures), options.merge_materials, &mut known)),
             });
             let numbers = numbers.collect();
-            let looks = if asset.has_uncolored() { Looks::read(&asset.objects_path(), &options.style)? } else { Looks::default() };
-            let colored = (0..looks.len()).map(|look| {
-                SurfaceClass::ALL.map(|class| out.add(plain(looks.color(look, class, &options.style)), options.merge_materials, &mut known))
+            let colors = if asset.has_uncolored() { SurfaceColors::read(&asset.objects_path(), &options.style)? } else { SurfaceColors::default() };
+            let colored = (0..colors.len()).map(|palette| {
+                SurfaceClass::ALL.map(|class| out.add(plain(colors.color(palette, class, &options.style)), options.merge_materials, &mut known))
             });
             let colored = colored.collect();
-            out.assets.push(AssetMaterials { numbers, looks, colored });
+            out.assets.push(AssetMaterials { numbers, colors, colored });
             let lacks = |m: &&Material| (m.texture.is_some() || m.alpha.is_some()) && textures.get(m).is_none();
             out.without_their_texture.push(asset.materials.iter().filter(lacks).count() as u64);
         }
@@ -92,8 +92,8 @@ impl BuildMaterials {
         match asset.numbers[material as usize] {
             MaterialNumber::Own(number) => number,
             MaterialNumber::OfSurface(class) => {
-                let look = asset.looks.of(object);
-                asset.colored[look][asset.looks.class(look, class, up) as usize]
+                let palette = asset.colors.of(object);
+                asset.colored[palette][asset.colors.class(palette, class, up) as usize]
             }
         }
     }

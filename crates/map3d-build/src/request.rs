@@ -6,7 +6,7 @@ use map3d_base::{Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
 
 use crate::content::Choice;
-use crate::looks::StyleRule;
+use crate::surface_colors::StyleRule;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

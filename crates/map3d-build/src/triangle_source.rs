@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use map3d_base::{Extent, Vec3, vec3};
+use map3d_base::{KeptSpace, Vec3, vec3};
 use map3d_scene::lattice::{Point, snap};
 
 use crate::assets::Asset;
@@ -23,7 +23,7 @@ pub(crate) struct TriangleSource<'a> {
     pub options: &'a BuildOptions,
     pub origin: Vec3,
     /// Triangles outside it are left out.
-    pub extent: Option<&'a Extent>,
+    pub extent: Option<&'a KeptSpace>,
 }
 
 impl TriangleSource<'_> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use map3d_base::Extent;
+use map3d_base::KeptSpace;
 use map3d_base::asset::{self, AssetReport, Materials, Object, Rank};
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -173,7 +173,7 @@ impl AssetMesh {
     /// geometry. With an extent (JSON of `find_clusters`), boxes of what is in it, and for each object the number of triangles that are not.
     #[pyo3(signature = (count, extent=None))]
     fn boxes(&self, py: Python<'_>, count: usize, extent: Option<&str>) -> PyResult<Boxes> {
-        let extent: Option<Extent> = extent.map(serde_json::from_str).transpose().map_err(|e| invalid(format!("extent: {e}")))?;
+        let extent: Option<KeptSpace> = extent.map(serde_json::from_str).transpose().map_err(|e| invalid(format!("extent: {e}")))?;
         let boxes = py.detach(|| self.0.boxes(count, extent.as_ref())).map_err(to_python)?;
         let prototypes = boxes.prototypes.iter().filter_map(|(k, bounds)| corners_of(bounds).map(|c| (*k, c)));
         Ok((boxes.objects.iter().map(corners_of).collect(), prototypes.collect(), boxes.outside))

@@ -27,7 +27,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("TILE_PX", (limits::TILE_PX[0], limits::TILE_PX[1]))?;
     m.add("DEEPEST_LEVEL", limits::DEEPEST_LEVEL)?;
     m.add("QUALITY", (limits::QUALITY[0], limits::QUALITY[1]))?;
-    m.add("MAX_FROM_ORIGIN_M", map3d_base::extent::MAX_FROM_ORIGIN_M)?;
+    m.add("MAX_FROM_ORIGIN_M", map3d_base::kept_space::MAX_FROM_ORIGIN_M)?;
     m.add("MAX_SUNS", limits::MAX_SUNS)?;
     m.add("LAYERS", serde_json::to_string(&map3d_base::layers::LAYERS).expect("plain values"))?;
     m.add("AO_RADIUS_M", (limits::AO_RADIUS_M[0], limits::AO_RADIUS_M[1]))?;

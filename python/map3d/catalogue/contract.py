@@ -132,8 +132,8 @@ class Catalogue(OperationCatalogue, Protocol):
     def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
         """Leases the next job in one atomic statement, after expiring overdue leases. Returns None when no job is available now.
 
-        The order is: fewest attempts and expired leases, lowest level; among these the first job with ground number `start` or greater, else the
-        first; of equal ground, the first track. A worker passes the ground number of its last block to stay in the same region.
+        The order is: fewest attempts and expired leases, lowest level; among these the first job with Hilbert index `start` or greater, else the
+        first; of equal ground, the first track. A worker passes the Hilbert index of its last block to stay in the same region.
         """
 
     def lease_block(self, rendering: str, worker: str, track: str, block: BlockId) -> Lease | None:

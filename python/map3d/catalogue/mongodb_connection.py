@@ -26,7 +26,7 @@ MIGRATED_BATCH: Final = 1_000
 
 
 def _add_ground(database: Database[Document]) -> None:
-    """Gives every job a ground number. The index over the former order of leases goes."""
+    """Gives every job a Hilbert index. The index over the former order of leases goes."""
     jobs = database["job"]
     without = jobs.find({"ground": {"$exists": False}}, {"morton": 1})
     while updates := [UpdateOne({"_id": job["_id"]}, {"$set": {"ground": job["morton"]}}) for job in islice(without, MIGRATED_BATCH)]:

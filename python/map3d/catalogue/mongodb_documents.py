@@ -76,7 +76,7 @@ def dump_result(result: JobResult) -> Document:
 
 
 def _ground(document: Document) -> int:
-    """A program of catalogue version 1 that still runs beside a newer one plans jobs without a ground number."""
+    """A program of catalogue version 1 that still runs beside a newer one plans jobs without a Hilbert index."""
     ground: int = document["ground" if "ground" in document else "morton"]
     return ground
 

@@ -242,7 +242,7 @@ class MongoOperations(MongoJobs):
         return str(found[0]["scene"] if new.is_on_rendering else new.target)
 
     def _next_number(self) -> int:
-        """Returns a number greater than all before. A lost answer costs a number."""
+        """Returns the next operation number. A lost response skips a number."""
         counters = self._connection.collection("counter")
         change = {"$inc": {"last": 1}}
         counted = self._connection.run(

@@ -139,4 +139,4 @@ def uncancellable(operation: OperationRecord) -> BadRequest:
 
 
 def expiry_message(expiries: int) -> str:
-    return f"its worker ended {expiries} times before the operation did; look for what kills it, then retry"
+    return f"the worker died {expiries} times during this operation; fix the cause, then retry"

@@ -149,7 +149,7 @@ class RenderingRecord:
 @dataclass(frozen=True)
 class PlannedJob:
     """A block that should exist. `order`: Morton number of its root tile. `parent`: the reduce block that takes its seam, None at the top.
-    `key`: hash of everything that its bytes depend on. `ground`: its ground number, in whose order jobs are leased; a reduce block has that of its
+    `key`: hash of everything that its bytes depend on. `ground`: its Hilbert index, in whose order jobs are leased; a reduce block has that of its
     first base block."""
 
     track: str

@@ -10,7 +10,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from map3d.catalogue import Workspace
 from map3d.catalogue.records import LOCAL_CRS_NAME
 from map3d.cli.from_request import request_options
-from map3d.cli.import_reports import asset_warning_lines, left_alone_lines, place_line
+from map3d.cli.import_reports import asset_warning_lines, ignored_lines, place_line
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import print_json, print_table
 from map3d.cli.progress import progress_bar
@@ -47,7 +47,7 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], request: Ad
     if as_json:
         print_json({"imported": done, "failed": [{"source": path, "error": text} for path, text in failed]})
     else:
-        _print(place, scene, done, failed, result.left_alone)
+        _print(place, scene, done, failed, result.ignored)
     if failed:
         raise click.exceptions.Exit(1)
 
@@ -59,14 +59,14 @@ def _show(bar: Progress, task: Any) -> "OnFile":
     return show
 
 
-def _print(place: str | None, scene: str, done: Sequence[Any], failed: Sequence[tuple[str, str]], left_alone: Sequence[tuple[str, str]]) -> None:
+def _print(place: str | None, scene: str, done: Sequence[Any], failed: Sequence[tuple[str, str]], ignored: Sequence[tuple[str, str]]) -> None:
     rows = [(item.asset, item.format, item.objects, item.triangles, skipped_count(item.report), _placed(item.report)) for item in done]
     if rows:
         print_table(("asset", "format", "objects", "triangles", "skipped", "coordinates"), rows)
     for item in done:
         for line in asset_warning_lines(item.asset, item.report):
             click.echo(line)
-    for line in left_alone_lines(left_alone):
+    for line in ignored_lines(ignored):
         click.echo(line)
     for _, text in failed:
         click.echo(f"not imported: {text}", err=True)

@@ -37,16 +37,16 @@ def missing_textures_line(reports: Mapping[str, Mapping[str, Any]]) -> str | Non
     return f"{missing:,} of {images:,} textures missing, e.g. {asset}: {example}; they must be in the given folder or below"
 
 
-def left_alone_lines(left_alone: Sequence[tuple[str, str]]) -> Iterator[str]:
+def ignored_lines(ignored: Sequence[tuple[str, str]]) -> Iterator[str]:
     """Yields a line for each kind of file that map3d does not read, and for files that are terrain alone."""
     by_reason: dict[str, list[str]] = {}
-    for file, reason in left_alone:
+    for file, reason in ignored:
         by_reason.setdefault(reason, []).append(file)
     for reason, files in sorted(by_reason.items()):
         if reason == AS_TERRAIN:
             yield f"no objects in {names_text(files)}: {reason}"
         else:
-            yield f"left alone, since map3d does not read it: {names_text(files)} ({reason})"
+            yield f"ignored (unsupported format): {names_text(files)} ({reason})"
 
 
 def asset_warning_lines(asset: str, report: Mapping[str, Any], limit: int = 8) -> Iterator[str]:

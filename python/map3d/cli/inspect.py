@@ -9,7 +9,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from map3d.cli.file_tables import MAX_ROWS, findings_lines, kinds_text, print_files, textures_text
 from map3d.cli.from_request import request_options
-from map3d.cli.import_reports import left_alone_lines
+from map3d.cli.import_reports import ignored_lines
 from map3d.cli.options import json_option
 from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.progress import progress_bar
@@ -60,7 +60,7 @@ def _print(found: "Inspection") -> None:
         _print_rows(_summary(found))
     for line in findings_lines(found.files):
         click.echo(line)
-    for line in left_alone_lines(found.left_alone):
+    for line in ignored_lines(found.ignored):
         click.echo(line)
     for _, reason in found.failed:
         click.echo(f"not readable: {reason}", err=True)

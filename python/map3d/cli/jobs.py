@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from map3d.jobs.reproduce import Reproduction
 
 _WIDTH: Final = 160
-"""Width of tables in a pipe."""
+"""Table width when stdout is not a terminal."""
 
 
 class JobCommands(OrderedGroup):

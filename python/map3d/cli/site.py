@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.from_request import request_options
-from map3d.cli.import_reports import left_alone_lines, missing_textures_line, place_line, warning_lines
+from map3d.cli.import_reports import ignored_lines, missing_textures_line, place_line, warning_lines
 from map3d.cli.options import workspace_option
 from map3d.cli.output import names_text, plural, size_text
 from map3d.cli.progress import progress_bar
@@ -101,7 +101,7 @@ def _print_summary(summary: "ImportSummary") -> None:
         click.echo(f"removed, since no longer in the folder: {names_text(summary.removed)}")
     if summary.elsewhere:
         click.echo(f"kept, since not from this folder: {names_text(summary.elsewhere)}; map3d remove-files removes them")
-    for line in left_alone_lines(summary.left_alone):
+    for line in ignored_lines(summary.ignored):
         click.echo(line)
     for _, reason in summary.failed:
         click.echo(f"not imported: {reason}", err=True)

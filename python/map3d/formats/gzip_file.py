@@ -37,7 +37,7 @@ def unpacked_head(path: Path, size: int) -> bytes:
 
 
 def content_bytes(path: Path) -> int:
-    """Returns the size of a file or, if it is packed, of its content. Raises LimitExceeded for a content that no honest file has."""
+    """Returns the size of a file or, if it is packed, of its content. Raises LimitExceeded if it unpacks beyond the limits of zip_archive."""
     status = path.stat()
     return _count_bytes(path, status.st_mtime_ns, status.st_size) if is_gzip(path) else status.st_size
 

@@ -70,7 +70,7 @@ RASTER: Final = SourceFormat(
     detect_companion=lambda head, path: has_world_file(path, head),
     sparse_options=("max_error_m",),
     is_grouped=True,
-    in_pieces=True,
+    has_checkpoints=True,
     cpu_s=600,
     memory_bytes=2 * GIB,
 )

@@ -57,7 +57,7 @@ class SourceFormat:
     `options`: those of an import that the reader has; of `sparse_options`, an asset records only what differs from the default, since the reader had
     them later. `has_crs`: files name their coordinate system; of others it may be unknown. `is_grouped`: the files of a folder are one source.
     `names_files`: documents name other files, in the folder that was given; `find_files` finds those that are there, `find_missing` those that are
-    not. `links`: documents refer to each other. `in_pieces`: a broken import resumes with its finished pieces. `cpu_s`: processor time for
+    not. `links`: documents refer to each other. `has_checkpoints`: a broken import resumes from its checkpoints. `cpu_s`: processor time for
     each 100 MB or part of it; `memory_bytes`: for files up to that size."""
 
     name: str
@@ -78,6 +78,6 @@ class SourceFormat:
     find_files: FindFiles = lambda _path, _root: set()
     find_missing: Callable[[Path, Path | None], MissingFiles] = lambda _path, _root: MissingFiles([], 0, 0)
     links: LinkedDocuments | None = None
-    in_pieces: bool = False
+    has_checkpoints: bool = False
     cpu_s: int = 60
     memory_bytes: int = GIB

@@ -170,7 +170,7 @@ def pin(box: Box, tile_px: int, res_m: float, views: Iterable[ViewAngles], windo
     return frames
 
 
-def pin_beside(frame: PinnedFrame, box: Box, angles: ViewAngles, window: Window | None = None) -> PinnedFrame:
+def pin_into(frame: PinnedFrame, box: Box, angles: ViewAngles, window: Window | None = None) -> PinnedFrame:
     """Returns the frame of a view that joins a rendering, with its size, levels and tile size. `box`, `window`: those of the rendering's creation."""
     added = _frame(box, check_angles(angles), frame.size_m, frame.tile_px, frame.zmax, window)
     check_content(added, box, window)

@@ -1,4 +1,4 @@
-"""Hilbert numbers, which order the squares of a grid so that consecutive squares share a side."""
+"""Hilbert indices, which order the squares of a grid so that consecutive squares share a side."""
 
 from typing import Final
 
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 MAX_LEVEL: Final = 31
 
 
-def hilbert_numbers(level: int, x: ArrayLike, y: ArrayLike) -> NDArray[np.int64]:
+def hilbert_indices(level: int, x: ArrayLike, y: ArrayLike) -> NDArray[np.int64]:
     """Returns the numbers along the Hilbert curve of the columns x and rows y of a grid of 2^level × 2^level squares, level ≤ 31.
 
     Hilbert (1891), computed from the highest bit down: the quadrant, then the rotation of what is in it.

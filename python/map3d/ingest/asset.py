@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from map3d import _core
 from map3d.errors import StoreError
-from map3d.ingest.content import Extent
+from map3d.ingest.content import ContentExtent
 from map3d.registry import NewObject
 from map3d.registry.object_boxes import unite_boxes
 from map3d.types import Box, Vec3
@@ -29,13 +29,13 @@ def read_objects(folder: Path) -> list[dict[str, Any]]:
         return [json.loads(line) for line in lines]
 
 
-def world_boxes(folder: Path, count: int, extent: Extent | None = None) -> list[Box | None]:
+def world_boxes(folder: Path, count: int, extent: ContentExtent | None = None) -> list[Box | None]:
     """Returns the box of each of `count` objects in world coordinates, placed prototypes included, or None. With an extent, the boxes
     of what is in it."""
     return boxes_within(folder, count, extent)[0]
 
 
-def boxes_within(folder: Path, count: int, extent: Extent | None) -> tuple[list[Box | None], list[int]]:
+def boxes_within(folder: Path, count: int, extent: ContentExtent | None) -> tuple[list[Box | None], list[int]]:
     """Returns the box of each object, and the number of its triangles and placed prototypes outside the extent."""
     boxes, prototypes, outside = _core.AssetMesh(str(folder / "mesh.m3a")).boxes(count, None if extent is None else extent.text)
     instances = json.loads((folder / "materials.json").read_text(encoding="utf-8")).get("instances", [])

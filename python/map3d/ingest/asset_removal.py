@@ -14,7 +14,7 @@ from typing import Final
 
 from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import NotFound, StoreError
-from map3d.ingest.import_pieces import remove_pieces
+from map3d.ingest.import_checkpoints import remove_checkpoints
 from map3d.registry import Registry
 
 _MARK: Final = ".removing"
@@ -45,7 +45,7 @@ def finish_removal(workspace: Workspace, catalogue: Catalogue, scene: str) -> li
         with suppress(NotFound):
             catalogue.remove_asset(scene, name)
         remove_folder(workspace.asset_folder(scene, name))
-        remove_pieces(workspace.asset_folder(scene, name))
+        remove_checkpoints(workspace.asset_folder(scene, name))
     with Registry(workspace.registry_path(scene)) as registry:
         registry.remove_assets(names)
     mark.unlink()

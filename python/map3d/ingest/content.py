@@ -25,7 +25,7 @@ class Cluster:
 
 
 @dataclass(frozen=True)
-class Extent:
+class ContentExtent:
     """`text`: JSON of `_core.find_clusters`."""
 
     text: str
@@ -47,7 +47,7 @@ class Content:
     """`extent`: None when everything stays; `outside`: numbers of the folders with content outside it."""
 
     clusters: tuple[Cluster, ...]
-    extent: Extent | None
+    extent: ContentExtent | None
     outside: tuple[int, ...]
 
 
@@ -59,7 +59,7 @@ def find_content(folders: Sequence[Path], origin: Vec3, options: Mapping[str, An
     chosen = {name: options[name] for name in (KEEP_OUTLIERS, CLUSTER) if options.get(name)}
     found = json.loads(_core.find_clusters([str(folder) for folder in folders], origin, json.dumps(chosen)))
     clusters = tuple(Cluster(number, _box(*row["box"]), row["triangles"], row["objects"]) for number, row in enumerate(found["clusters"], 1))
-    extent = None if found["extent"] is None else Extent(json.dumps(found["extent"]))
+    extent = None if found["extent"] is None else ContentExtent(json.dumps(found["extent"]))
     return Content(clusters, extent, tuple(found["outside"]))
 
 

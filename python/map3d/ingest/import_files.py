@@ -24,13 +24,13 @@ OnFile = Callable[[str, int, int, str], None]
 
 @dataclass(frozen=True)
 class FilesImport:
-    """`unchanged`: names of assets that were up to date and not imported again; `failed`: (file, reason); `left_alone`: (file, what it
+    """`unchanged`: names of assets that were up to date and not imported again; `failed`: (file, reason); `ignored`: (file, what it
     is) for files of the folders that map3d does not read."""
 
     imported: list[Imported] = field(default_factory=list)
     unchanged: list[str] = field(default_factory=list)
     failed: list[tuple[str, str]] = field(default_factory=list)
-    left_alone: list[tuple[str, str]] = field(default_factory=list)
+    ignored: list[tuple[str, str]] = field(default_factory=list)
 
 
 def import_files(
@@ -55,8 +55,8 @@ def import_files(
         virtual = [path for path in found.paths if options.virtual_rasters and path not in archives]
         done = _import_files(workspace, catalogue, scene, found.paths, virtual, options, progress)
         failed = [(found.original(path), found.original(reason)) for path, reason in done.failed]
-        left_alone = [(found.original(path), found.original(reason)) for path, reason in done.left_alone]
-        return FilesImport(done.imported, done.unchanged, failed, left_alone)
+        ignored = [(found.original(path), found.original(reason)) for path, reason in done.ignored]
+        return FilesImport(done.imported, done.unchanged, failed, ignored)
 
 
 def _import_files(
@@ -74,7 +74,7 @@ def _import_files(
         files,
         options.name,
         lambda path, reason: result.failed.append((str(path), reason)),
-        lambda path, reason: result.left_alone.append((str(path), reason)),
+        lambda path, reason: result.ignored.append((str(path), reason)),
         {asset.name: Path(asset.source) for asset in assets},
         virtual,
         _taken_names(workspace, assets, files),
@@ -109,7 +109,7 @@ def _import_files(
                     grids.collect(done.report.get("grids", ()))
             except OnlyGrids as found:
                 grids.collect(found.grids)
-                result.left_alone.append((str(source.paths[0]), AS_TERRAIN))
+                result.ignored.append((str(source.paths[0]), AS_TERRAIN))
             except Map3dError as error:
                 if options.strict or (is_single and not result.imported and not result.unchanged):
                     raise

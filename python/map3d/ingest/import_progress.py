@@ -1,4 +1,4 @@
-"""How far an import is, as text: what was read, and for terrain the rate and the remaining time."""
+"""Formats the progress of an import: what was read, and for terrain the rate and the remaining time."""
 
 import time
 from collections import deque
@@ -11,7 +11,7 @@ WINDOW_S: Final = 60.0
 
 
 class ImportProgress:
-    """Measures the rate of the last `WINDOW_S`, so that pieces of a killed import soon do not count."""
+    """Measures the rate of the last `WINDOW_S`, so that checkpoints of a killed import soon do not count."""
 
     def __init__(self) -> None:
         self._reports: deque[tuple[float, int]] = deque()

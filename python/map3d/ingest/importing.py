@@ -17,9 +17,9 @@ from map3d.formats import find_format
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
 from map3d.ingest.content import find_content
 from map3d.ingest.findings import findings
+from map3d.ingest.import_checkpoints import checkpoints_key, import_checkpoints
 from map3d.ingest.import_inputs import ImportInputs, import_inputs
 from map3d.ingest.import_options import ImportOptions
-from map3d.ingest.import_pieces import import_pieces, pieces_key
 from map3d.ingest.import_progress import ImportProgress
 from map3d.ingest.parser_process import ParserProcess
 from map3d.ingest.relief_grids import AS_TERRAIN, Grid
@@ -35,7 +35,7 @@ MAX_MISSING_NAMES: Final = 200
 MAX_FROM_ORIGIN_M: Final = _core.MAX_FROM_ORIGIN_M
 
 _NOT_IN_PIECES: Final = ("strict", "max_object_bytes", "max_appearance_bytes")
-"""Options on which the pieces of a terrain do not depend."""
+"""Options on which the checkpoints of a terrain do not depend."""
 
 OnProgress = Callable[[str], None]
 """Called with the number of triangles or tiles read so far, as text."""
@@ -88,9 +88,9 @@ def import_file(
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
     try:
-        with _pieces(record, source, final, inputs) as pieces:
+        with _checkpoints(record, source, final, inputs) as checkpoints:
             with parser or ParserProcess() as running:
-                parsed = _parse(record, source, options, draft, pieces, progress, running, entry or find_format(source.format).parser)
+                parsed = _parse(record, source, options, draft, checkpoints, progress, running, entry or find_format(source.format).parser)
             report = parsed["report"]
             if not report["triangles"] and report.get("grids"):
                 raise OnlyGrids(f"{source.paths[0]}: {AS_TERRAIN}", report["grids"])
@@ -104,14 +104,14 @@ def import_file(
         shutil.rmtree(draft, ignore_errors=True)
 
 
-def _pieces(record: SceneRecord, source: SourceDocument, final: Path, inputs: ImportInputs) -> AbstractContextManager[Path | None]:
-    """Returns the folder for the pieces of an import; None for a format that is imported as a whole."""
-    if not find_format(source.format).in_pieces:
+def _checkpoints(record: SceneRecord, source: SourceDocument, final: Path, inputs: ImportInputs) -> AbstractContextManager[Path | None]:
+    """Returns the folder for the checkpoints of an import; None for a format that is imported as a whole."""
+    if not find_format(source.format).has_checkpoints:
         return nullcontext()
     options = {name: value for name, value in inputs.options.items() if name not in _NOT_IN_PIECES}
     paths = [str(path.absolute()) for path in source.paths]
     key = {"files": inputs.files, "paths": paths, "options": options, "reader": inputs.reader, "scene_crs": _crs_text(record.crs)}
-    return import_pieces(final, pieces_key(key))
+    return import_checkpoints(final, checkpoints_key(key))
 
 
 def _parse(
@@ -119,7 +119,7 @@ def _parse(
     source: SourceDocument,
     options: ImportOptions,
     draft: Path,
-    pieces: Path | None,
+    checkpoints: Path | None,
     progress: OnProgress | None,
     parser: ParserProcess,
     entry: str,
@@ -135,7 +135,7 @@ def _parse(
         "crs": options.crs,
         "scene_crs": _crs_text(record.crs),
         "scene_origin": record.origin,
-        "pieces": None if pieces is None else str(pieces.absolute()),
+        "checkpoints": None if checkpoints is None else str(checkpoints.absolute()),
         "cores": usable_cores(),
         "grids": {str(path.absolute()): grid for path, grid in source.grids.items()},
         "virtual": {str(path.absolute()): str(folder.absolute()) for path, folder in source.virtual_folders.items()},

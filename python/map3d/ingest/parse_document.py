@@ -10,7 +10,7 @@ from map3d import _core
 from map3d.ingest.document_reprojector import DocumentReprojector
 from map3d.ingest.findings import finding
 from map3d.ingest.texture_places import transform_positions
-from map3d.ingest.upright_check import Extent
+from map3d.ingest.upright_check import UprightCheck
 from map3d.subprocess import Handler, ReportProgress
 
 _REPORT_EVERY_TRIANGLES: Final = 50_000
@@ -33,13 +33,13 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
     strict = bool(request["reader"].get("strict"))
     reprojector = DocumentReprojector(request["format"], reader.srs_name, request["scene_crs"], stated=request["crs"], strict=strict)
     writer = _core.AssetWriter(request["folder"])
-    extent, triangles, reported = Extent(), 0, 0
+    upright, triangles, reported = UprightCheck(), 0, 0
     for batch in reader:
         if not batch.prototype:
             positions = reprojector.to_world(batch.positions, reader.crs_names()[batch.crs], batch.triangle_count)
             if positions is None:
                 continue
-            extent.add(positions)
+            upright.add(positions)
             batch.set_positions(positions)
         writer.append(batch)
         triangles += batch.triangle_count
@@ -52,7 +52,7 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
     counts = json.loads(writer.finish(reader))
     if unplaced:
         counts["findings"].append(finding("implicit-geometry-without-place", unplaced))
-    hints = extent.hints(request["path"]) if request["reader"].get("up") == "z" else []
+    hints = upright.hints(request["path"]) if request["reader"].get("up") == "z" else []
     report = reprojector.report(counts)
     report["findings"] += hints
     grids = json.loads(reader.grids())

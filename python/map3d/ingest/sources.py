@@ -64,7 +64,7 @@ def find_sources(
     paths: Iterable[Path],
     name: str | None = None,
     on_unreadable: OnUnreadable | None = None,
-    on_left_alone: OnUnreadable | None = None,
+    on_ignored: OnUnreadable | None = None,
     known: Mapping[str, Path] | None = None,
     virtual: Collection[Path] = (),
     taken: Collection[str] = (),
@@ -75,7 +75,7 @@ def find_sources(
     The rasters below a given folder are one source, named after the folder that holds them all; those given one by one are one source, named after
     the first.
 
-    `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not; `on_left_alone` for other files
+    `on_unreadable` is called for files in folders whose suffix announces a known format that their content is not; `on_ignored` for other files
     that hold a city or a raster in a format that map3d does not read, or whose format is unknown. `known`: the files of assets by name; a file whose
     name is needed for several keeps the one that it has there. `virtual`: those of the paths at which virtual rasters are read; the rasters that
     one in a folder names are not read a second time. `taken`: known names that a source has only if it is the file of that
@@ -90,7 +90,7 @@ def find_sources(
     given: dict[str, list[Path]] = {}
     for path in paths:
         if path.is_dir():
-            found = _search_folder(path, on_unreadable or (lambda *_: None), on_left_alone or (lambda *_: None), virtual=path in virtual)
+            found = _search_folder(path, on_unreadable or (lambda *_: None), on_ignored or (lambda *_: None), virtual=path in virtual)
             documents += [_Group(unpacked_path(file).stem, format, (file,), path) for file, format in found if not format.is_grouped]
             grouped += _group_files(found, path, virtual=path in virtual)
         elif not path.exists():
@@ -121,9 +121,7 @@ def source_digest(source: SourceDocument) -> str:
     return total.hexdigest()[:32]
 
 
-def _search_folder(
-    folder: Path, on_unreadable: OnUnreadable, on_left_alone: OnUnreadable, *, virtual: bool = False
-) -> list[tuple[Path, SourceFormat]]:
+def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_ignored: OnUnreadable, *, virtual: bool = False) -> list[tuple[Path, SourceFormat]]:
     found: list[tuple[Path, SourceFormat]] = []
     unknown: list[tuple[Path, str]] = []
     for path in sorted(path for path in _walk(folder) if path.exists() and not path.name.startswith(".")):
@@ -150,7 +148,7 @@ def _search_folder(
         if unpacked_path(path).suffix.lower() in _SOURCE_SUFFIXES:
             on_unreadable(path, reason)
         else:
-            on_left_alone(path, reason.removeprefix(f"{path}: ").partition("; map3d reads")[0])
+            on_ignored(path, reason.removeprefix(f"{path}: ").partition("; map3d reads")[0])
     return _without_named(found, folder) if virtual else found
 
 

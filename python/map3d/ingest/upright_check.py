@@ -12,8 +12,8 @@ MIN_HEIGHT_M: Final = 100.0
 TIMES_DEPTH: Final = 3.0
 
 
-class Extent:
-    """The box of all positions of a document."""
+class UprightCheck:
+    """Collects the box of all positions of a document and warns if the model seems to lie on its side."""
 
     def __init__(self) -> None:
         self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)

@@ -12,8 +12,8 @@ def worker_name(number: int) -> str:
 
 
 def expire_dead_workers(catalogue: Catalogue, rendering: str) -> int:
-    """Expires the leases of workers whose process was on this host and has ended, such as those of a killed run; returns their number. The leases of
-    other hosts' workers expire in their own time."""
+    """Expires the leases of workers whose process was on this host and has ended, such as those of a killed run; returns their number. Leases
+    held on other hosts expire normally."""
     workers = {job.worker for job in catalogue.jobs(rendering, state=State.LEASED) if job.worker is not None}
     return catalogue.expire(rendering, [worker for worker in workers if _has_ended(worker)])
 

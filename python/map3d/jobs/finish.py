@@ -16,7 +16,7 @@ from map3d.types import Box
 
 
 @dataclass(frozen=True)
-class Extent:
+class PlannedOccupancy:
     """`box`: of the scene that was planned; `occupancy`: the base tiles of each view that open blocks of its first pass may fill."""
 
     box: Box
@@ -30,8 +30,7 @@ class Extent:
 
     @classmethod
     def announced(cls, workspace: Workspace, catalogue: Catalogue, record: RenderingRecord) -> Self:
-        """Returns the extent that the run announced that planned the rendering. Takes it from the scene when that run was killed before it wrote the
-        manifest."""
+        """Returns what the run that planned the rendering announced; what the scene says if that run was killed before it wrote the manifest."""
         try:
             data = read_manifest(workspace, record)
             manifest = None if data is None else Manifest.load(data, str(workspace.manifest_path(record.name)))
@@ -42,13 +41,13 @@ class Extent:
         return cls(manifest.box, {view.frame.id: view.occupancy for view in manifest.views})
 
 
-def finish(workspace: Workspace, catalogue: Catalogue, rendering: str, extent: Extent | None = None) -> bool:
-    """Writes the manifest of the rendering's present state; returns whether all its jobs are done. `extent`: None for that of the last plan."""
+def finish(workspace: Workspace, catalogue: Catalogue, rendering: str, expected: PlannedOccupancy | None = None) -> bool:
+    """Writes the manifest of the rendering's present state; returns whether all its jobs are done. `expected`: None for that of the last plan."""
     record, counts = catalogue.rendering(rendering), catalogue.count_jobs(rendering)
     is_complete = counts[State.DONE] == sum(counts.values())
     with scene_in_use(workspace, catalogue.scene(record.scene)):
-        extent = extent or Extent.announced(workspace, catalogue, record)
-        write_manifest(workspace, catalogue, rendering, extent.box, {} if is_complete else _within_open(catalogue, record, extent.occupancy))
+        expected = expected or PlannedOccupancy.announced(workspace, catalogue, record)
+        write_manifest(workspace, catalogue, rendering, expected.box, {} if is_complete else _within_open(catalogue, record, expected.occupancy))
     return is_complete
 
 

@@ -17,7 +17,7 @@ from map3d.jobs.open_jobs import count_open
 from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
 from map3d.jobs.timeouts import Timeouts
-from map3d.jobs.worker import Signal, Worker
+from map3d.jobs.worker import JobEnded, Worker
 
 _POLL_S = 0.2
 
@@ -44,7 +44,7 @@ class Pool:
         self._catalogue, self._rendering, self._task, self._timeouts = catalogue, rendering, task, timeouts or Timeouts()
         self._size, self.stop = size, stop or StopRequest()
         self._events: queue.SimpleQueue[RunEvent] = queue.SimpleQueue()
-        self._stop, self._stop_now, self._job_ended = threading.Event(), threading.Event(), Signal()
+        self._stop, self._stop_now, self._job_ended = threading.Event(), threading.Event(), JobEnded()
         self._threads: dict[str, threading.Thread] = {}
         self._workers: dict[str, Worker] = {}
         self._started = 0
@@ -69,7 +69,7 @@ class Pool:
         return self.statistics
 
     def _open_ground(self) -> NDArray[np.int64]:
-        """Returns the ground numbers of the base blocks to do, of all views together, in ascending order."""
+        """Returns the Hilbert indices of the base blocks to do, of all views together, in ascending order."""
         jobs = self._catalogue.jobs(self._rendering, state=State.TODO)
         return np.sort(np.fromiter((job.ground for job in jobs if job.kind == "base"), np.int64))
 

@@ -12,7 +12,7 @@ from map3d.catalogue.scene_lock import scene_lock
 from map3d.catalogue.states import OPEN
 from map3d.errors import StalePlan
 from map3d.jobs.events import Planned, RunEvent
-from map3d.jobs.finish import Extent, finish
+from map3d.jobs.finish import PlannedOccupancy, finish
 from map3d.jobs.local_pool import LocalPools, PoolRunner
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.run_statistics import RunStatistics
@@ -37,7 +37,7 @@ class RunPlan:
     open_jobs: int
     done_jobs: int
     quarantined_jobs: int
-    extent: Extent
+    expected: PlannedOccupancy
 
 
 @dataclass(frozen=True)
@@ -78,10 +78,10 @@ class Run:
         if planned.added or tiles_url(self.record) is None:
             self._prune()
         counts = self._catalogue.count_jobs(self.record.name)
-        extent = Extent.of_scene(self._catalogue, self.record, opened, is_complete=counts[State.DONE] == sum(counts.values()))
-        if extent.occupancy or planned.added or not self._workspace.manifest_path(self.record.name).is_file():
-            write_manifest(self._workspace, self._catalogue, self.record.name, extent.box, extent.occupancy)
-        return RunPlan(planned, sum(counts[state] for state in OPEN), counts[State.DONE], counts[State.QUARANTINED], extent)
+        expected = PlannedOccupancy.of_scene(self._catalogue, self.record, opened, is_complete=counts[State.DONE] == sum(counts.values()))
+        if expected.occupancy or planned.added or not self._workspace.manifest_path(self.record.name).is_file():
+            write_manifest(self._workspace, self._catalogue, self.record.name, expected.box, expected.occupancy)
+        return RunPlan(planned, sum(counts[state] for state in OPEN), counts[State.DONE], counts[State.QUARANTINED], expected)
 
     def work(self, plan: RunPlan, on_event: Callable[[RunEvent], None]) -> RunResult:
         """Has workers do the jobs until none are left or the user stops them, then writes the manifest. Plans again when the scene is rebuilt
@@ -97,7 +97,7 @@ class Run:
         raise StalePlan(f"rendering {self.record.name}: its files changed {MAX_PLANS} times during the render; run it again when they stay the same")
 
     def _finish(self, plan: RunPlan, statistics: RunStatistics, stats: Mapping[str, float]) -> RunResult:
-        complete = finish(self._workspace, self._catalogue, self.record.name, plan.extent)
+        complete = finish(self._workspace, self._catalogue, self.record.name, plan.expected)
         counts = self._catalogue.count_jobs(self.record.name)
         open_jobs = sum(counts[state] for state in OPEN)
         return RunResult(statistics, complete, self.stop.is_made, open_jobs, counts[State.QUARANTINED], self.record.content_version, stats)

@@ -12,7 +12,7 @@ from map3d.jobs.open_jobs import has_jobs_left
 from map3d.jobs.timeouts import Timeouts
 
 
-class Signal:
+class JobEnded:
     """Wakes idle workers when a job has ended, since that may have opened another one."""
 
     def __init__(self) -> None:
@@ -37,13 +37,13 @@ class Worker:
     """Runs in its own thread. When `stop` is set it finishes its job and exits."""
 
     def __init__(
-        self, name: str, catalogue: Catalogue, rendering: str, runner: JobRunner, timeouts: Timeouts, stop: threading.Event, job_ended: Signal
+        self, name: str, catalogue: Catalogue, rendering: str, runner: JobRunner, timeouts: Timeouts, stop: threading.Event, job_ended: JobEnded
     ) -> None:
         self.name, self._catalogue, self._rendering, self._runner = name, catalogue, rendering, runner
         self._timeouts, self._stop, self._job_ended = timeouts, stop, job_ended
         self._failed: set[tuple[str, str]] = set()
         self.start = 0
-        """Ground number from which the worker takes its next base block: blocks of the same ground share chunks and textures."""
+        """Hilbert index from which the worker takes its next base block: blocks of the same ground share chunks and textures."""
         self.idle_since: float | None = None
         """Monotonic seconds; None while the worker has a job or starts a subprocess."""
 

@@ -8,7 +8,7 @@ from typing import Final
 from map3d.catalogue import Catalogue, RenderingRecord, Workspace
 from map3d.catalogue.records import WINDOW
 from map3d.errors import BadRequest
-from map3d.geometry.frames import Window, pin, pin_beside
+from map3d.geometry.frames import Window, pin, pin_into
 from map3d.geometry.views import check_angles
 from map3d.lifecycle.remove_rendering import finish_rendering_removal
 from map3d.renderings.block_limit import check_block_count
@@ -86,7 +86,7 @@ def add_views(catalogue: Catalogue, name: str, views: Sequence[ViewAngles]) -> R
     Raises NotFound, BadRequest for a view that exists already, OutsideFrame for one that does not fit the rendering's square.
     """
     record = catalogue.rendering(name)
-    frames = [pin_beside(record.frames[0], record.box, view, record.window) for view in views]
+    frames = [pin_into(record.frames[0], record.box, view, record.window) for view in views]
     ids = [frame.id for frame in (*record.frames, *frames)]
     if duplicates := sorted({view for view in ids if ids.count(view) > 1}):
         raise BadRequest(f"rendering {name}: view {', '.join(duplicates)} exists already or is given twice")

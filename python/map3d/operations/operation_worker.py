@@ -1,4 +1,4 @@
-"""The operation worker: leases operations and has a subprocess do each, so that a crash costs the operation alone."""
+"""The operation worker: leases operations and runs each in a subprocess, so that a crash fails only that operation."""
 
 import time
 from collections.abc import Callable, Collection
@@ -76,13 +76,13 @@ class OperationWorker:
         operation = lease.operation
         name = f"operation {operation.id} ({operation.kind} {operation.target})"
         self.on_operation(f"{name} begins")
-        heart = _Heart(self.catalogue, lease, self.stop, self.heartbeat_s)
+        keeper = _LeaseKeeper(self.catalogue, lease, self.stop, self.heartbeat_s)
         try:
-            message = self._run_subprocess(lease, heart)
-            heart.complete()
+            message = self._run_subprocess(lease, keeper)
+            keeper.complete()
             state = OperationState.DONE
         except _Cancelled:
-            message, state = f"cancelled while {heart.stage}", OperationState.CANCELLED
+            message, state = f"cancelled while {keeper.stage}", OperationState.CANCELLED
         except _Interrupted:
             self._clean_up(lease)
             if self.stop.is_made:
@@ -101,14 +101,14 @@ class OperationWorker:
         self.on_operation(f"{name} is {state}: {message}")
         return True
 
-    def _run_subprocess(self, lease: OperationLease, heart: "_Heart") -> str:
+    def _run_subprocess(self, lease: OperationLease, keeper: "_LeaseKeeper") -> str:
         """Returns the message of the operation's end. Raises the error with which it failed."""
-        heart.beat()
+        keeper.beat()
         setup = {"workspace": str(self.workspace.root.absolute()), "catalogue": self.workspace.catalogue_url}
         process = Subprocess(self.entry, setup)
         try:
             process.wait_ready(START_S)
-            answer = process.request(request_of(lease.operation), wall_s=None, every_s=self.heartbeat_s / 4, on_progress=heart.on_progress)
+            answer = process.request(request_of(lease.operation), wall_s=None, every_s=self.heartbeat_s / 4, on_progress=keeper.on_progress)
         finally:
             process.close()
         if isinstance(answer, Failure):
@@ -134,8 +134,8 @@ class OperationWorker:
             time.sleep(min(left, 0.1))
 
 
-class _Heart:
-    """Passes progress to the catalogue; raises _Interrupted when the subprocess has to stop."""
+class _LeaseKeeper:
+    """Renews the lease with the operation's progress; raises _Cancelled or _Interrupted when the subprocess has to stop."""
 
     def __init__(self, catalogue: Catalogue, lease: OperationLease, stop: StopRequest, every_s: float) -> None:
         self._catalogue, self._lease, self._stop, self._every_s = catalogue, lease, stop, every_s

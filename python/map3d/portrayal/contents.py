@@ -13,7 +13,7 @@ from map3d.catalogue import Catalogue, SceneRecord, Workspace
 from map3d.portrayal.request_crs import SceneSystems, systems_of
 from map3d.portrayal.service_exception import ServiceException, invalid, quote
 from map3d.portrayal.styles import DEFAULT_STYLE, find_style
-from map3d.registry import AssetSummary, Registry
+from map3d.registry import RegisteredAsset, Registry
 from map3d.registry.object_boxes import unite_boxes
 from map3d.registry.registry import SCENE_ASSET
 from map3d.scenes.scene_cache import scene_in_use
@@ -30,7 +30,7 @@ class AssetLayer:
     scene: str
     name: str
     title: str
-    summary: AssetSummary
+    summary: RegisteredAsset
 
     @property
     def identifier(self) -> str:

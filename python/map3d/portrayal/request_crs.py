@@ -143,7 +143,7 @@ def _systems(scene: str, wkt: str | None, origin: Vec3) -> SceneSystems:
 
 
 def _transformer(flat: CRS, origin: Vec3) -> Transformer | None:
-    """Returns the way from longitude and latitude to easting and northing; None if the system does not locate the scene."""
+    """Returns the transformer from longitude/latitude to easting/northing; None if the system does not locate the scene."""
     try:
         to_own = Transformer.from_crs(WGS84, flat, always_xy=True)
         place = to_own.transform(origin[0], origin[1], direction="INVERSE")

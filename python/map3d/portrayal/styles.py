@@ -11,20 +11,20 @@ from map3d.portrayal.service_exception import ServiceException, quote
 
 
 @dataclass(frozen=True)
-class Style:
+class PortrayalStyle:
     name: str
     title: str
     abstract: str
 
 
-STYLES: Final[Mapping[str, Style]] = {
+STYLES: Final[Mapping[str, PortrayalStyle]] = {
     style.name: style
     for style in (
-        Style("textured", "Textures and materials", "The colours of textures and materials, without light"),
-        Style(
+        PortrayalStyle("textured", "Textures and materials", "The colours of textures and materials, without light"),
+        PortrayalStyle(
             "white", "White model", "White surfaces without textures, darker the more they turn away from a lamp in the south-west, high in the sky"
         ),
-        Style("objects", "Colours by object", "A colour of its own for each object, derived from its id, shaded like the white model"),
+        PortrayalStyle("objects", "Colours by object", "A colour of its own for each object, derived from its id, shaded like the white model"),
     )
 }
 """By name, in the order of the capabilities."""

@@ -133,7 +133,7 @@ def _left_out(report: SiteReport) -> str:
 
 def _others(report: SiteReport) -> str:
     """Returns the files that are not in the map."""
-    tagged = (("not imported", "tag bad", report.failed), ("left alone", "tag", report.left_alone))
+    tagged = (("not imported", "tag bad", report.failed), ("ignored", "tag", report.ignored))
     rows = [_other_row(tag, style, file, reason) for tag, style, pairs in tagged for file, reason in pairs[:MAX_ROWS]]
     if not rows:
         return ""

@@ -66,7 +66,7 @@ class RegisteredObject:
 
 
 @dataclass(frozen=True)
-class AssetSummary:
+class RegisteredAsset:
     """`box`: local, None if the asset has no geometry; `lods`: the levels of detail that occur, ordered."""
 
     count: int

@@ -20,7 +20,7 @@ from map3d.registry.column_documents import column_documents
 from map3d.registry.columns import attribute_index
 from map3d.registry.documents import ATTRIBUTES, SHARDS, Document, dump_document
 from map3d.registry.object_boxes import include_children
-from map3d.registry.registered_objects import AssetSummary, NewObject, ObjectKind, RegisteredObject, plain_attributes
+from map3d.registry.registered_objects import NewObject, ObjectKind, RegisteredAsset, RegisteredObject, plain_attributes
 from map3d.registry.search_index import search_documents
 from map3d.types import OBJECTS_PER_SHARD, Box
 
@@ -139,7 +139,7 @@ class Registry:
             last = rows[-1]["id"]
             yield from map(_to_object, rows)
 
-    def asset_summaries(self) -> dict[str, AssetSummary]:
+    def asset_summaries(self) -> dict[str, RegisteredAsset]:
         """Returns count, box and levels of detail of the present objects of each asset."""
         corners = "min(x0), min(y0), min(z0), max(x1), max(y1), max(z1)"
         with self._database.reading() as db:
@@ -147,7 +147,7 @@ class Registry:
             lods: dict[str, list[str]] = {}
             for asset, lod in db.execute("SELECT DISTINCT asset, lod FROM object WHERE present AND lod IS NOT NULL ORDER BY lod"):
                 lods.setdefault(asset, []).append(lod)
-        return {row[0]: AssetSummary(row[1], _box_of(row[2:]), tuple(lods.get(row[0], ()))) for row in rows}
+        return {row[0]: RegisteredAsset(row[1], _box_of(row[2:]), tuple(lods.get(row[0], ()))) for row in rows}
 
     def asset_kinds(self) -> dict[str, list[ObjectKind]]:
         """Returns the classes and levels of detail of the present objects of each asset, the most frequent first."""

@@ -14,7 +14,7 @@ from map3d.catalogue import Catalogue, PlannedJob, RenderingRecord, Track
 from map3d.errors import OutsideFrame
 from map3d.geometry.core_frame import core_frame
 from map3d.geometry.frames import PinnedFrame, check_content
-from map3d.renderings.ground_numbers import GroundNumbers
+from map3d.renderings.hilbert_indices import HilbertIndices
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Numbers, Occupancy, numbers_of, union_of, xy_from_morton
 from map3d.types import BlockId, Box
@@ -69,7 +69,7 @@ def plan_jobs(
 def _plan_views(
     scene: PlannedScene, rendering: RenderingRecord, known: Mapping[str, Numbers], progress: Callable[[int, int], None] | None
 ) -> Iterator[PlannedJob]:
-    ground = GroundNumbers(rendering)
+    ground = HilbertIndices(rendering)
     for done, frame in enumerate(rendering.frames):
         if progress is not None:
             progress(done, len(rendering.frames))
@@ -118,7 +118,7 @@ def _check_frame(scene: PlannedScene, rendering: RenderingRecord, frame: PinnedF
 
 @dataclass(frozen=True)
 class _Block:
-    """`number`: Morton number; `ground`: ground number."""
+    """`number`: Morton number; `ground`: Hilbert index."""
 
     number: int
     id: BlockId
@@ -126,7 +126,7 @@ class _Block:
     ground: int
 
 
-def _base_blocks(scene: PlannedScene, track: Track, root: int, numbers: Numbers, ground: GroundNumbers) -> Iterator[_Block]:
+def _base_blocks(scene: PlannedScene, track: Track, root: int, numbers: Numbers, ground: HilbertIndices) -> Iterator[_Block]:
     """Yields the base blocks, computing the keys of `KEY_BATCH` blocks at a time."""
     frame = track_frame(track)
     for start in range(0, len(numbers), KEY_BATCH):

@@ -63,7 +63,7 @@ def build_in_subprocess(
 
 
 def _error(scene: str, failure: Failure) -> Exception:
-    """Returns the exception that the subprocess raised; what it says of a limit of the core concerns the whole scene."""
+    """Returns the exception that the subprocess raised; a limit error of the core is reported for the scene."""
     if failure.kind == "LimitError":
         return LimitExceeded(f"scene {scene}: {failure.message}; remove the files with such triangles, or leave out what is far away")
     kind = getattr(_core, failure.kind, None) or getattr(errors, failure.kind, None)

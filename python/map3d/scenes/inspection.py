@@ -19,14 +19,14 @@ _SCENE: Final = "inspect"
 @dataclass(frozen=True)
 class Inspection:
     """`crs`: that of the scene which an import of the files makes; `box`: of all files, in that CRS. `clusters`: groups of content far from each
-    other, largest first; empty when everything is in one place. `failed`: (file, reason); `left_alone`: (file, what it is)."""
+    other, largest first; empty when everything is in one place. `failed`: (file, reason); `ignored`: (file, what it is)."""
 
     crs: SceneCrs | None
     box: Box | None
     files: tuple[FileContents, ...]
     clusters: tuple[Cluster, ...]
     failed: tuple[tuple[str, str], ...]
-    left_alone: tuple[tuple[str, str], ...]
+    ignored: tuple[tuple[str, str], ...]
 
 
 def inspect_files(paths: Sequence[Path], options: ImportOptions, progress: OnFile | None = None) -> Inspection:
@@ -42,7 +42,7 @@ def inspect_files(paths: Sequence[Path], options: ImportOptions, progress: OnFil
             files = tuple(file_contents(workspace, catalogue, _SCENE))
             clusters = _clusters(workspace, catalogue)
             crs = catalogue.scene(_SCENE).crs
-    return Inspection(crs, union([file.box for file in files]), files, clusters, tuple(imported.failed), tuple(imported.left_alone))
+    return Inspection(crs, union([file.box for file in files]), files, clusters, tuple(imported.failed), tuple(imported.ignored))
 
 
 def _clusters(workspace: Workspace, catalogue: Catalogue) -> tuple[Cluster, ...]:

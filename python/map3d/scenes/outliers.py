@@ -12,7 +12,7 @@ from map3d import _core
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
 from map3d.errors import BadRequest
 from map3d.ingest.asset import boxes_within, read_objects
-from map3d.ingest.content import CLUSTER, KEEP_OUTLIERS, Cluster, Content, Extent, find_content
+from map3d.ingest.content import CLUSTER, KEEP_OUTLIERS, Cluster, Content, ContentExtent, find_content
 from map3d.registry import Registry
 from map3d.types import Box, Vec3
 
@@ -89,15 +89,15 @@ class OutlierCheck:
         path.write_text(json.dumps(asdict(found), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
         return found
 
-    def _kept(self, extent: Extent) -> tuple[int, ...]:
+    def _kept(self, extent: ContentExtent) -> tuple[int, ...]:
         return tuple(cluster.number for cluster in self.content.clusters if cluster.box in extent.boxes)
 
-    def _register(self, registry: Registry, extent: Extent | None) -> tuple[FileOutliers, ...]:
+    def _register(self, registry: Registry, extent: ContentExtent | None) -> tuple[FileOutliers, ...]:
         """Registers the boxes of what is in the extent; returns what is not."""
         found = (self._register_asset(registry, asset, extent) for asset in self.assets)
         return tuple(file for file in found if file is not None)
 
-    def _register_asset(self, registry: Registry, asset: AssetRecord, extent: Extent | None) -> FileOutliers | None:
+    def _register_asset(self, registry: Registry, asset: AssetRecord, extent: ContentExtent | None) -> FileOutliers | None:
         folder = self.workspace.asset_folder(self.scene.name, asset.name)
         ids = np.frombuffer((folder / "ids.u32").read_bytes(), dtype="<u4").tolist()
         all_boxes, _ = boxes_within(folder, len(ids), None)

@@ -38,7 +38,7 @@ class SiteFiles:
 @dataclass(frozen=True)
 class ImportSummary:
     """Names of assets. `again`: those of `imported` that existed, with the reason; `failed`: (file, reason); `elsewhere`: assets from other folders,
-    which stay; `left_alone`: (file, what it is) for files of the folder that map3d does not read."""
+    which stay; `ignored`: (file, what it is) for files of the folder that map3d does not read."""
 
     imported: list[str] = field(default_factory=list)
     again: dict[str, str] = field(default_factory=dict)
@@ -46,7 +46,7 @@ class ImportSummary:
     failed: list[tuple[str, str]] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
     elsewhere: list[str] = field(default_factory=list)
-    left_alone: list[tuple[str, str]] = field(default_factory=list)
+    ignored: list[tuple[str, str]] = field(default_factory=list)
 
 
 def update_files(workspace: Workspace, catalogue: Catalogue, files: SiteFiles, report: OnSource) -> ImportSummary:
@@ -115,7 +115,7 @@ class _Update:
         return sources
 
     def _leave_alone(self, path: Path, reason: str) -> None:
-        self._summary.left_alone.append((str(path.relative_to(self._files.folder)), reason))
+        self._summary.ignored.append((str(path.relative_to(self._files.folder)), reason))
 
     def _is_inside(self, asset: AssetRecord) -> bool:
         path = Path(asset.source)

@@ -21,7 +21,7 @@ VERSION: Final = 2
 
 @dataclass(frozen=True)
 class SiteReport:
-    """`place`: the middle of the scene and the nearest town; `failed`: (file, reason); `left_alone`: (file, what it is); `left_out`: lines about
+    """`place`: the middle of the scene and the nearest town; `failed`: (file, reason); `ignored`: (file, what it is); `left_out`: lines about
     content far from the rest. `why`: reason of the resolution, empty when the user chose it; `seconds`: of the last run that rendered something, None
     before it."""
 
@@ -31,7 +31,7 @@ class SiteReport:
     box: Box | None
     files: tuple[FileContents, ...]
     failed: tuple[tuple[str, str], ...]
-    left_alone: tuple[tuple[str, str], ...]
+    ignored: tuple[tuple[str, str], ...]
     left_out: tuple[str, ...]
     views: tuple[str, ...]
     res_m: float
@@ -75,7 +75,7 @@ def _path(workspace: Workspace, rendering: str) -> Path:
 
 
 def _parse(value: Mapping[str, Any]) -> SiteReport:
-    pairs = {name: tuple((file, text) for file, text in value[name]) for name in ("failed", "left_alone")}
+    pairs = {name: tuple((file, text) for file, text in value[name]) for name in ("failed", "ignored")}
     lists = {name: tuple(value[name]) for name in ("left_out", "views")}
     return SiteReport(**{**value, **pairs, **lists, "box": _parse_box(value["box"]), "files": tuple(map(_parse_file, value["files"]))})
 

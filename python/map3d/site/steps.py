@@ -101,7 +101,7 @@ def store_report(
         box=box,
         files=tuple(replace(file, findings=tuple(_published(finding, file.source, folder) for finding in file.findings)) for file in files),
         failed=tuple((_without_folder(file, folder), _without_folder(reason, folder)) for file, reason in summary.failed),
-        left_alone=tuple(summary.left_alone),
+        ignored=tuple(summary.ignored),
         left_out=tuple(outlier_lines(read_outliers(workspace, request.name), scene.crs)),
         views=view_names([frame.angles for frame in record.frames]),
         res_m=record.res_m,

@@ -11,7 +11,7 @@ MAX_LINES: Final = 1000
 @dataclass
 class Findings:
     """`wrong`: the first MAX_LINES problems, one line each: where, found, expected. `total`: the number of all problems. `counted`: the number of
-    checked things by kind. `blocks`: (track, block) of all problems that a new render of the block heals."""
+    checked things by kind. `blocks`: (track, block) of all problems that re-rendering the block fixes."""
 
     wrong: list[str] = field(default_factory=list)
     total: int = 0

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::AssetMesh;
 use crate::error::{Error, Result};
-use crate::extent::Extent;
+use crate::kept_space::KeptSpace;
 use crate::vec3::Box3;
 
 /// Triangles between two releases of resident pages.
@@ -24,7 +24,7 @@ pub struct MeshBoxes {
 impl AssetMesh {
     /// Computes the boxes of `count` objects, of their triangles in `extent` if there is one, and of all prototypes in one pass, in bounded memory.
     /// Fails for a triangle of an object ≥ `count`.
-    pub fn boxes(&self, count: usize, extent: Option<&Extent>) -> Result<MeshBoxes> {
+    pub fn boxes(&self, count: usize, extent: Option<&KeptSpace>) -> Result<MeshBoxes> {
         let mut boxes = MeshBoxes { objects: vec![Box3::EMPTY; count], prototypes: BTreeMap::new(), outside: vec![0; count] };
         let (triangles, objects, prototypes, positions) = (self.triangles(), self.objects(), self.prototypes(), self.positions());
         for (t, corners) in triangles.iter().enumerate() {

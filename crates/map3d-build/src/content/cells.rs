@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use map3d_base::extent::{bounds_of, diagonal_m};
+use map3d_base::kept_space::{bounds_of, diagonal_m};
 use map3d_base::{Box3, Vec3};
 use serde::{Deserialize, Serialize};
 

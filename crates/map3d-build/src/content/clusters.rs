@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use map3d_base::extent::{Extent, Region, diagonal_m, gap_m};
+use map3d_base::kept_space::{KeptSpace, Region, diagonal_m, gap_m};
 use map3d_base::{Box3, Error, Result, Vec3};
 use serde::Serialize;
 
@@ -68,7 +68,7 @@ impl Content {
     }
 
     /// Returns what stays; `None` when nothing is far from the rest, so that everything does.
-    pub fn extent(&self, choice: Choice, origin: Vec3) -> Result<Option<Extent>> {
+    pub fn extent(&self, choice: Choice, origin: Vec3) -> Result<Option<KeptSpace>> {
         let groups = self.groups();
         let number = match choice {
             Choice::Number(n) if n == 0 || n as usize > groups.len() => {
@@ -81,13 +81,13 @@ impl Content {
         let region = |g: &ContentCell| Region { bounds: g.bounds, reach_m: [apart_m(size_m, g).max(APART_M), apart_in_height_m(size_m, g)] };
         let kept = if choice == Choice::All { &groups[..] } else { &groups[number.min(groups.len())..groups.len().min(number + 1)] };
         let regions: Vec<Region> = kept.iter().map(region).collect();
-        let extent = Extent { regions, large_m: self.large_m(), all_around: (choice == Choice::All).then_some(origin) };
-        let largest = Extent { regions: groups.iter().take(1).map(region).collect(), all_around: None, ..extent.clone() };
+        let extent = KeptSpace { regions, large_m: self.large_m(), all_around: (choice == Choice::All).then_some(origin) };
+        let largest = KeptSpace { regions: groups.iter().take(1).map(region).collect(), all_around: None, ..extent.clone() };
         Ok((groups.len() > 1 || self.has_far_large(&largest)).then_some(extent))
     }
 
     /// Whether some content of this asset is not certain to stay.
-    pub fn reaches_outside(&self, extent: &Extent) -> bool {
+    pub fn reaches_outside(&self, extent: &KeptSpace) -> bool {
         let leaves = |class: u8, c: &ContentCell| {
             if is_large(class, extent.large_m) { c.zeros > 0 || !extent.keeps(spanning(c)) } else { !in_region(extent, c) }
         };
@@ -95,21 +95,21 @@ impl Content {
     }
 
     /// Returns about how many triangles are added when edges longer than `edge_m` are split.
-    pub fn added_by_splitting(&self, extent: Option<&Extent>, edge_m: f64) -> f64 {
+    pub fn added_by_splitting(&self, extent: Option<&KeptSpace>, edge_m: f64) -> f64 {
         let pieces = |class: u8| (f64::exp2(f64::from(class)) / edge_m).max(1.0).powi(2) - 1.0;
         self.kept(extent).map(|((class, _), c)| c.triangles as f64 * pieces(*class)).sum()
     }
 
     /// Returns the boxes of the cells whose content stays.
-    pub fn boxes<'a>(&'a self, extent: Option<&'a Extent>) -> impl Iterator<Item = Box3> + 'a {
+    pub fn boxes<'a>(&'a self, extent: Option<&'a KeptSpace>) -> impl Iterator<Item = Box3> + 'a {
         self.kept(extent).map(|(_, c)| c.bounds)
     }
 
-    fn kept<'a>(&'a self, extent: Option<&'a Extent>) -> impl Iterator<Item = (&'a CellKey, &'a ContentCell)> + 'a {
+    fn kept<'a>(&'a self, extent: Option<&'a KeptSpace>) -> impl Iterator<Item = (&'a CellKey, &'a ContentCell)> + 'a {
         self.cells.cells.iter().filter(move |(_, c)| extent.is_none_or(|e| in_region(e, c) || e.keeps(spanning(c))))
     }
 
-    fn has_far_large(&self, extent: &Extent) -> bool {
+    fn has_far_large(&self, extent: &KeptSpace) -> bool {
         let mut large = self.cells.cells.iter().filter(|((class, _), _)| is_large(*class, extent.large_m));
         large.any(|(_, c)| c.zeros > 0 || !extent.keeps(spanning(c)))
     }
@@ -188,7 +188,7 @@ fn spanning(cell: &ContentCell) -> [Vec3; 3] {
     [cell.bounds.lo, cell.bounds.center(), cell.bounds.hi]
 }
 
-fn in_region(extent: &Extent, cell: &ContentCell) -> bool {
+fn in_region(extent: &KeptSpace, cell: &ContentCell) -> bool {
     let inside = |r: &Region| (0..3).all(|k| cell.bounds.lo[k] >= r.bounds.lo[k] && cell.bounds.hi[k] <= r.bounds.hi[k]);
     extent.all_around.is_some() || extent.regions.iter().any(inside)
 }
@@ -240,7 +240,7 @@ mod tests {
         Content { cells }
     }
 
-    fn extent(content: &Content, choice: Choice) -> Option<Extent> {
+    fn extent(content: &Content, choice: Choice) -> Option<KeptSpace> {
         content.extent(choice, TOWN).expect("an extent")
     }
 

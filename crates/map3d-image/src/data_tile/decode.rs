@@ -103,7 +103,7 @@ impl<'a> Column<'a> {
 }
 
 /// A label while its runs are read.
-struct Label {
+struct DecodedLabel {
     id: u32,
     normal: [u8; 3],
     shape: u8,
@@ -126,7 +126,7 @@ struct Above {
 struct DataTileReader<'a> {
     codes: std::slice::Iter<'a, u8>,
     lengths: std::vec::IntoIter<u64>,
-    labels: Vec<Label>,
+    labels: Vec<DecodedLabel>,
     begun: usize,
     residuals: ResidualReader<'a>,
     tile: DataTile,
@@ -226,7 +226,7 @@ impl<'a> DataTileReader<'a> {
     }
 }
 
-fn read_labels(count: usize, body: &mut &[u8]) -> Option<Vec<Label>> {
+fn read_labels(count: usize, body: &mut &[u8]) -> Option<Vec<DecodedLabel>> {
     let ids = Column::take(body, count, 4)?;
     let normals = Column::take(body, count, 3)?;
     let shapes = Column::take(body, count, 1)?.bytes;
@@ -248,7 +248,7 @@ fn read_labels(count: usize, body: &mut &[u8]) -> Option<Vec<Label>> {
         let slopes = if shape & 3 >= OWN_SLOPES { *known.get(&normal)? } else { Slopes::default() };
         let start = if *shape == NO_DEPTHS { 0 } else { unfold_long(starts.next()?) };
         let normal = [normal as u8, (normal >> 8) as u8, (normal >> 16) as u8];
-        labels.push(Label { id, normal, shape: *shape, slopes, start, x: 0, y: 0, offset: 0 });
+        labels.push(DecodedLabel { id, normal, shape: *shape, slopes, start, x: 0, y: 0, offset: 0 });
     }
     Some(labels)
 }

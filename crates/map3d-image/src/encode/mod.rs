@@ -123,7 +123,7 @@ impl Encoder {
 
 fn methods_of(kind: LayerKind) -> Result<png::MethodPair> {
     let row = kind.row();
-    let array = row.array.ok_or_else(|| Error::argument(format!("layer {kind:?} is no PNG")))?;
+    let array = row.array.ok_or_else(|| Error::argument(format!("layer {kind:?} is not a PNG")))?;
     Ok(match array.pixel {
         PixelType::U16x4 => png::COLOR,
         PixelType::I16x3 => png::NORMAL,

@@ -72,11 +72,11 @@ impl FileError {
     }
 }
 
-/// A file inside the folder. `oddity` describes how the name deviates from the file's actual name.
+/// A file inside the folder. `note` describes how the name deviates from the file's actual name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LocatedFile {
     pub path: PathBuf,
-    pub oddity: Option<Reason>,
+    pub note: Option<Reason>,
 }
 
 /// The folder in which a document's file names are resolved.
@@ -113,9 +113,9 @@ impl AssetFolder {
         let decoded = decode_percent(&slashed);
         let spellings = [(name, None), (&slashed, Some(Reason::FileNameBackslashes)), (&decoded, Some(Reason::FileNamePercentEncoded))];
         let mut error = FileError::NotFound;
-        for (spelling, oddity) in spellings {
+        for (spelling, note) in spellings {
             match self.canonicalize_inside(&self.base.join(spelling)) {
-                Ok(path) => return Ok(LocatedFile { path, oddity }),
+                Ok(path) => return Ok(LocatedFile { path, note }),
                 Err(FileError::NotFound) => {}
                 Err(other) => error = other,
             }
@@ -124,7 +124,7 @@ impl AssetFolder {
             return Err(error);
         }
         let path = self.find_ignoring_case(&slashed).or_else(|| self.find_ignoring_case(&decoded)).ok_or(FileError::NotFound)?;
-        Ok(LocatedFile { path: self.canonicalize_inside(&path)?, oddity: Some(Reason::FileNameCaseDiffers) })
+        Ok(LocatedFile { path: self.canonicalize_inside(&path)?, note: Some(Reason::FileNameCaseDiffers) })
     }
 
     /// Returns true for a canonical path of a regular file under the root.

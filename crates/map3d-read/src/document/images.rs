@@ -81,8 +81,8 @@ impl DocumentImages {
                 return Ok(None);
             }
         };
-        if let Some(oddity) = file.oddity {
-            report.note(oddity, name);
+        if let Some(note) = file.note {
+            report.note(note, name);
         }
         match DocumentImage::inspect(ImageSource::File(file.path), options) {
             Ok(image) => Ok(Some(self.add(image))),

@@ -52,13 +52,13 @@ impl BinaryTree {
         let mut stack = vec![(0usize, 0usize, items.len())];
         while let Some((node, start, end)) = stack.pop() {
             let slice = &mut items[start..end];
-            let extent = Extent::of(slice);
-            nodes[node].bounds = extent.bounds;
+            let bounds = ItemBounds::of(slice);
+            nodes[node].bounds = bounds.bounds;
             if slice.len() <= LEAF_ITEMS {
                 nodes[node].kind = Kind::Leaf { start: start as u32, end: end as u32 };
                 continue;
             }
-            let middle = start + split(slice, &extent);
+            let middle = start + split(slice, &bounds);
             let first = nodes.len();
             nodes[node].kind = Kind::Inner { children: [first as u32, first as u32 + 1] };
             for (k, (a, b)) in [(start, middle), (middle, end)].into_iter().enumerate() {
@@ -71,12 +71,12 @@ impl BinaryTree {
 }
 
 /// Box of items, and of twice their centres.
-struct Extent {
+struct ItemBounds {
     bounds: Aabb,
     centers: Aabb,
 }
 
-impl Extent {
+impl ItemBounds {
     fn of(items: &[Item]) -> Self {
         let mut out = Self { bounds: Aabb::EMPTY, centers: Aabb::EMPTY };
         for item in items {
@@ -93,11 +93,11 @@ fn leaf_cost(bounds: &Aabb, count: usize) -> f32 {
 }
 
 /// Reorders the items and returns how many go to the first side: at least one on each.
-fn split(items: &mut [Item], extent: &Extent) -> usize {
+fn split(items: &mut [Item], bounds: &ItemBounds) -> usize {
     if items.len() <= SWEEP_ITEMS {
         return split_swept(items);
     }
-    split_binned(items, extent).unwrap_or_else(|| split_at_middle(items.len()))
+    split_binned(items, bounds).unwrap_or_else(|| split_at_middle(items.len()))
 }
 
 /// Whole leaves on the first side.
@@ -162,8 +162,8 @@ impl Bins {
     }
 }
 
-fn split_binned(items: &mut [Item], extent: &Extent) -> Option<usize> {
-    let bins = Bins::new(items, &extent.centers);
+fn split_binned(items: &mut [Item], bounds: &ItemBounds) -> Option<usize> {
+    let bins = Bins::new(items, &bounds.centers);
     let (_, axis, border) = bins.best(items.len())?;
     let (mut a, mut b) = (0, items.len());
     while a < b {

@@ -20,9 +20,9 @@ from map3d.ingest.terrain.placed_rasters import PlacedRasters
 from map3d.ingest.terrain.raster_georeference import open_raster
 from map3d.ingest.terrain.raster_groups import split_far
 from map3d.ingest.terrain.raster_placement import RasterPlacement
+from map3d.ingest.terrain.terrain_checkpoints import GDAL_CACHE_MB
 from map3d.ingest.terrain.terrain_import import import_terrain
 from map3d.ingest.terrain.terrain_options import MAX_WORKERS, TerrainOptions
-from map3d.ingest.terrain.terrain_pieces import GDAL_CACHE_MB
 from map3d.ingest.virtual_raster import check_virtual_raster
 from map3d.subprocess import Handler, ReportProgress
 
@@ -43,7 +43,7 @@ def open_terrain_parser(_setup: Mapping[str, Any]) -> Handler:
 
 
 def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """`request`: {"paths", "folder", "name", "crs", "scene_crs", "scene_origin", "reader", "pieces": folder or None, "cores",
+    """`request`: {"paths", "folder", "name", "crs", "scene_crs", "scene_origin", "reader", "checkpoints": folder or None, "cores",
     "virtual": the virtual rasters that may be read, and the folders in which the rasters that they name must be,
     "grids": the rasters that RasterReliefs name, and their grids}.
 
@@ -72,8 +72,8 @@ def _parse_placed(request: Mapping[str, Any], placed: PlacedRasters, report_prog
 
     options = TerrainOptions(name=request["name"], max_error_m=request["reader"].get("max_error_m", 0.0), crs=request["crs"])
     options = replace(options, workers=worker_count(request["cores"], _free_bytes(), options.texture_px, orthos))
-    pieces = request["pieces"] and Path(request["pieces"])
-    terrain = import_terrain(dems, orthos, Path(request["folder"]), target, options, on_tile, pieces=pieces)
+    checkpoints = request["checkpoints"] and Path(request["checkpoints"])
+    terrain = import_terrain(dems, orthos, Path(request["folder"]), target, options, on_tile, checkpoints=checkpoints)
     proposed = LOCAL if target is None else to_scene_crs(target)
     placing = {"from": terrain["crs"] and CRS.from_user_input(terrain["crs"]).name, "to": proposed.name, **terrain["projection"]}
     if placement.place is not None:

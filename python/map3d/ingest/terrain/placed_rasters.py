@@ -28,7 +28,7 @@ ELSEWHERE: Final = "RasterRelief: raster in another place than its grid, read in
 MAX_APART_PX: Final = 0.5
 
 
-class _Place(NamedTuple):
+class _PixelTransform(NamedTuple):
     """Transform of pixel corners to positions, east first, and the CRS of these, or None."""
 
     transform: Affine
@@ -61,9 +61,9 @@ class PlacedRasters:
                 if raster.transform.is_identity and raster.crs is None:
                     return self._write(path, raster, place, grid)
                 self._compare(path, raster, place)
-                return self._write(path, raster, _Place(raster.transform, place.crs), None) if raster.crs is None and place.crs else path
+                return self._write(path, raster, _PixelTransform(raster.transform, place.crs), None) if raster.crs is None and place.crs else path
 
-    def _write(self, path: Path, raster: Any, place: _Place, grid: Mapping[str, Any] | None) -> Path:
+    def _write(self, path: Path, raster: Any, place: _PixelTransform, grid: Mapping[str, Any] | None) -> Path:
         """Writes a virtual raster; its name is that of the raster, since messages name it."""
         if grid is not None and (raster.width, raster.height) != (grid["columns"], grid["rows"]):
             raise ImportFailed(
@@ -79,7 +79,7 @@ class PlacedRasters:
         check_virtual_raster(virtual, path.resolve().parent)
         return virtual
 
-    def _compare(self, path: Path, raster: Any, place: _Place) -> None:
+    def _compare(self, path: Path, raster: Any, place: _PixelTransform) -> None:
         """Warns of a raster whose own georeference is another one than that of its grid."""
         own = own_crs(raster, self._stated)
         corners = np.array([(0.0, 0.0), (raster.width, 0.0), (0.0, raster.height), (raster.width, raster.height)]).T
@@ -106,7 +106,7 @@ def _without_place(text: str) -> str:
     return text
 
 
-def _place_of(grid: Mapping[str, Any], stated_crs: str | None) -> _Place:
+def _place_of(grid: Mapping[str, Any], stated_crs: str | None) -> _PixelTransform:
     """Returns the place that a grid says. Its points are the centres of pixels."""
     first, column, row = (np.array(grid[name], dtype=np.float64) for name in ("first", "column_step", "row_step"))
     name = grid["crs"] if stated_crs is None else stated_crs
@@ -122,4 +122,4 @@ def _place_of(grid: Mapping[str, Any], stated_crs: str | None) -> _Place:
             ordered = ordered[:, ::-1]
         first, column, row = ordered[0], ordered[1] - ordered[0], ordered[2] - ordered[0]
     corner = first - (column + row) / 2
-    return _Place(Affine(column[0], row[0], corner[0], column[1], row[1], corner[1]), crs)
+    return _PixelTransform(Affine(column[0], row[0], corner[0], column[1], row[1], corner[1]), crs)

@@ -22,8 +22,8 @@ from map3d.ingest.findings import finding
 from map3d.ingest.terrain import terrain_rasters
 from map3d.ingest.terrain.height_tint import HeightTint, write_tint
 from map3d.ingest.terrain.orthophoto import TextureTile
+from map3d.ingest.terrain.terrain_checkpoints import GDAL_CACHE_MB, TerrainCheckpoint, build_checkpoints, texture_folder
 from map3d.ingest.terrain.terrain_options import TerrainOptions
-from map3d.ingest.terrain.terrain_pieces import GDAL_CACHE_MB, TerrainPiece, build_pieces, texture_folder
 from map3d.ingest.terrain.terrain_rasters import REDUCE_RASTER, TerrainRasters
 from map3d.ingest.terrain.terrain_tiles import TerrainTile, TileBuilder, TileCounts
 
@@ -52,11 +52,11 @@ def import_terrain(
     options: TerrainOptions | None = None,
     progress: OnTile | None = None,
     writer: MeshWriter | None = None,
-    pieces: Path | None = None,
+    checkpoints: Path | None = None,
 ) -> dict[str, Any]:
     """Writes the asset into `asset_folder` and returns its report. Several rasters of one kind are a mosaic.
 
-    With `scene_crs` None the scene is local and coordinates stay unchanged. `pieces`: a folder for what is finished before all is, on the same file
+    With `scene_crs` None the scene is local and coordinates stay unchanged. `checkpoints`: their folder, on the same file
     system; only an import of the same rasters into the same scene with the same options may use it again. By default, a part of the asset folder that
     is removed at the end.
 
@@ -67,7 +67,7 @@ def import_terrain(
     if not dems and not orthos:
         raise BadRequest("nothing to import; give an elevation model, an orthophoto, or both")
     (asset_folder / "textures").mkdir(parents=True, exist_ok=True)
-    folder = pieces or asset_folder / "pieces"
+    folder = checkpoints or asset_folder / "checkpoints"
     try:
         with rasterio.Env(GDAL_CACHEMAX=GDAL_CACHE_MB), TerrainRasters(dems, orthos, scene_crs, options) as rasters:
             if writer is None:
@@ -78,7 +78,7 @@ def import_terrain(
             _write(rasters, options, content, writer, asset_folder / "textures", folder, progress or (lambda *_: True))
             report = _report(rasters, json.loads(writer.finish(None)), content)
     finally:
-        if pieces is None:
+        if checkpoints is None:
             shutil.rmtree(folder, ignore_errors=True)
     _write_report(asset_folder / "report.json", report)
     return report
@@ -103,30 +103,30 @@ class _TerrainContent:
 
 
 def _write(
-    rasters: TerrainRasters, options: TerrainOptions, content: _TerrainContent, writer: MeshWriter, textures: Path, pieces: Path, progress: OnTile
+    rasters: TerrainRasters, options: TerrainOptions, content: _TerrainContent, writer: MeshWriter, textures: Path, folder: Path, progress: OnTile
 ) -> None:
     grid = rasters.create_grid()
     if rasters.photo is None:
         content.tint = write_tint(textures, grid, rasters.height_field, rasters.covered_tiles(grid))
     done, total = 0, sum(1 for _ in rasters.covered_tiles(grid))
-    covered = rasters.covered_tiles(grid)
-    with closing(build_pieces(covered, total, pieces, options.workers, lambda: TileBuilder(rasters.reopen(), grid, content.tint, options))) as built:
-        for piece, count in built:
+    tiles, workers = rasters.covered_tiles(grid), options.workers
+    with closing(build_checkpoints(tiles, total, folder, workers, lambda: TileBuilder(rasters.reopen(), grid, content.tint, options))) as built:
+        for checkpoint, count in built:
             if not progress("terrain", done, total):
                 raise Stopped(f"terrain import stopped after {done} of {total} tiles; import the file again to resume")
-            _append(rasters, piece, content, writer, textures, options)
+            _append(rasters, checkpoint, content, writer, textures, options)
             done += count
     progress("terrain", total, total)
     writer.set_tables(json.dumps({"materials": content.materials, "instances": []}), json.dumps(content.objects))
 
 
 def _append(
-    rasters: TerrainRasters, piece: TerrainPiece, content: _TerrainContent, writer: MeshWriter, textures: Path, options: TerrainOptions
+    rasters: TerrainRasters, checkpoint: TerrainCheckpoint, content: _TerrainContent, writer: MeshWriter, textures: Path, options: TerrainOptions
 ) -> None:
-    content.counts.add(piece.counts)
-    for name, _ in piece.textures():
-        _link(texture_folder(piece.path.parent) / name, textures / name)
-    for tile in piece.read_tiles():
+    content.counts.add(checkpoint.counts)
+    for name, _ in checkpoint.textures():
+        _link(texture_folder(checkpoint.path.parent) / name, textures / name)
+    for tile in checkpoint.read_tiles():
         content.triangles += len(tile.triangles)
         if content.triangles > terrain_rasters.MAX_TRIANGLES:
             limit = terrain_rasters.MAX_TRIANGLES
@@ -170,7 +170,7 @@ def _tile_name(content: _TerrainContent, tile: TerrainTile) -> str:
 
 
 def _link(source: Path, target: Path) -> None:
-    """Puts a file of the pieces into the asset: as a link, so that the piece stays complete; as a copy where the file system has no links."""
+    """Puts a file of a checkpoint into the asset: as a link, so that the checkpoint stays complete, or as a copy if the file system has no links."""
     if target.exists():
         return
     try:

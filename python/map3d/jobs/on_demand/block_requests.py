@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from map3d.errors import Unavailable
-from map3d.jobs.on_demand.cache import Place
+from map3d.jobs.on_demand.cache import BlockAddress
 from map3d.types import BlockKind
 
 BUSY_RETRY_S: Final = 5
@@ -22,7 +22,7 @@ class BlockRequest:
     `clients`: number of clients that wait; `kept`: it is rendered even if they all go away.
     """
 
-    place: Place
+    address: BlockAddress
     kind: BlockKind
     ended: Future[None] = field(default_factory=Future)
     clients: int = 0
@@ -43,7 +43,7 @@ class BlockRequests:
     def __init__(self, limit: int) -> None:
         self._limit = limit
         self._changed = threading.Condition()
-        self._waiting: dict[Place, BlockRequest] = {}
+        self._waiting: dict[BlockAddress, BlockRequest] = {}
         self._version = 0
 
     def __len__(self) -> int:
@@ -53,14 +53,14 @@ class BlockRequests:
     def version(self) -> int:
         return self._version
 
-    def add(self, place: Place, kind: BlockKind, *, keep: bool = False) -> BlockRequest:
+    def add(self, address: BlockAddress, kind: BlockKind, *, keep: bool = False) -> BlockRequest:
         """Returns the request for a block, a new one unless it is waited for. Raises Unavailable when the queue is full."""
         with self._changed:
-            request = self._waiting.get(place)
+            request = self._waiting.get(address)
             if request is None:
                 if len(self._waiting) >= self._limit:
                     raise Unavailable(f"{self._limit} blocks are waiting to be rendered; try again in {BUSY_RETRY_S} s", BUSY_RETRY_S)
-                request = self._waiting[place] = BlockRequest(place, kind)
+                request = self._waiting[address] = BlockRequest(address, kind)
             request.kept |= keep
             request.clients += not keep
             self._notify()
@@ -80,12 +80,12 @@ class BlockRequests:
             self._notify()
         request.end(error)
 
-    def find(self, place: Place) -> BlockRequest | None:
+    def find(self, address: BlockAddress) -> BlockRequest | None:
         with self._changed:
-            return self._waiting.get(place)
+            return self._waiting.get(address)
 
     def of_rendering(self, rendering: str) -> list[BlockRequest]:
-        return [request for request in self if request.place[0] == rendering]
+        return [request for request in self if request.address[0] == rendering]
 
     def __iter__(self) -> Iterator[BlockRequest]:
         with self._changed:
@@ -106,5 +106,5 @@ class BlockRequests:
         self._changed.notify_all()
 
     def _remove(self, request: BlockRequest) -> None:
-        if self._waiting.get(request.place) is request:
-            del self._waiting[request.place]
+        if self._waiting.get(request.address) is request:
+            del self._waiting[request.address]

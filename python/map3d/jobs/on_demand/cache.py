@@ -14,7 +14,7 @@ from map3d.errors import LimitExceeded, NotFound, StaleFence
 from map3d.tiles.track_stores import find_track
 from map3d.types import BlockId
 
-Place = tuple[str, str, BlockId]
+BlockAddress = tuple[str, str, BlockId]
 """Rendering, track, block."""
 
 FILE: Final = "on-demand.sqlite"
@@ -44,9 +44,9 @@ class OnDemandCache:
 
     def reserve(self, lease: Lease, size_bytes: int) -> None:
         """Counts a block that is about to be written, after evicting others until it fits. Raises LimitExceeded if they do not suffice."""
-        place = (lease.rendering, lease.track, lease.block)
-        spared = {place}
-        while not self._insert_if_it_fits(place, lease.kind, size_bytes):
+        address = (lease.rendering, lease.track, lease.block)
+        spared = {address}
+        while not self._insert_if_it_fits(address, lease.kind, size_bytes):
             oldest = self._oldest(spared)
             if oldest is None:
                 raise LimitExceeded(
@@ -56,36 +56,36 @@ class OnDemandCache:
             if not self._evict(oldest):
                 spared.add(oldest)
 
-    def touch(self, places: Iterable[Place]) -> None:
+    def touch(self, addresses: Iterable[BlockAddress]) -> None:
         """Records that blocks were used now."""
         with self._database.transaction() as db:
-            db.executemany(f"UPDATE block SET used = {NOW} WHERE {_AT}", [_key(place) for place in places])
+            db.executemany(f"UPDATE block SET used = {NOW} WHERE {_AT}", [_key(address) for address in addresses])
 
     def used_bytes(self) -> int:
         with self._database.autocommit() as db:
             return int(db.execute("SELECT coalesce(sum(bytes), 0) FROM block").fetchone()[0])
 
-    def places(self) -> list[Place]:
+    def addresses(self) -> list[BlockAddress]:
         """Returns the blocks in the cache, least recently used first."""
         with self._database.autocommit() as db:
             rows = db.execute("SELECT rendering, track, z, x, y FROM block ORDER BY used, rendering, track, z, x, y").fetchall()
-        return [_place(row) for row in rows]
+        return [_address(row) for row in rows]
 
-    def _insert_if_it_fits(self, place: Place, kind: str, size_bytes: int) -> bool:
+    def _insert_if_it_fits(self, address: BlockAddress, kind: str, size_bytes: int) -> bool:
         with self._database.transaction() as db:
-            others = int(db.execute(_TOTAL, _key(place)).fetchone()[0])
+            others = int(db.execute(_TOTAL, _key(address)).fetchone()[0])
             if others + size_bytes > self.quota_bytes:
                 return False
-            db.execute(f"INSERT OR REPLACE INTO block VALUES (?, ?, ?, ?, ?, ?, ?, {NOW})", (*_key(place), kind, size_bytes))
+            db.execute(f"INSERT OR REPLACE INTO block VALUES (?, ?, ?, ?, ?, ?, ?, {NOW})", (*_key(address), kind, size_bytes))
         return True
 
-    def _oldest(self, spared: set[Place]) -> Place | None:
+    def _oldest(self, spared: set[BlockAddress]) -> BlockAddress | None:
         with self._database.autocommit() as db:
-            return next((place for row in db.execute(_OLDEST) if (place := _place(row)) not in spared), None)
+            return next((address for row in db.execute(_OLDEST) if (address := _address(row)) not in spared), None)
 
-    def _evict(self, place: Place) -> bool:
+    def _evict(self, address: BlockAddress) -> bool:
         """Evicts a block; returns False if it is in use. Blocks of complete or removed renderings only leave the list."""
-        rendering, track, block = place
+        rendering, track, block = address
         try:
             record, counts = self._catalogue.rendering(rendering), self._catalogue.count_jobs(rendering)
         except NotFound:
@@ -94,29 +94,29 @@ class OnDemandCache:
             return self._forget("rendering = ?", (rendering,))
         lease = self._catalogue.evict(rendering, self._worker, track, block) or self._catalogue.lease_block(rendering, self._worker, track, block)
         if lease is not None:
-            return self._remove_leased(record, place, lease)
+            return self._remove_leased(record, address, lease)
         job = self._catalogue.job(rendering, track, block)
         if job is not None and job.state not in (State.CANCELLED, State.QUARANTINED):
             return False
-        self._remove_tiles(record, place)
+        self._remove_tiles(record, address)
         return True
 
-    def _remove_leased(self, record: RenderingRecord, place: Place, lease: Lease) -> bool:
+    def _remove_leased(self, record: RenderingRecord, address: BlockAddress, lease: Lease) -> bool:
         try:
             self._catalogue.heartbeat(lease)
-            self._remove_tiles(record, place)
+            self._remove_tiles(record, address)
             self._catalogue.release(lease)
         except StaleFence:
             return False
         self.evicted += 1
         return True
 
-    def _remove_tiles(self, record: RenderingRecord, place: Place) -> None:
-        found = find_track(self._workspace, record, place[1], read_only=False)
+    def _remove_tiles(self, record: RenderingRecord, address: BlockAddress) -> None:
+        found = find_track(self._workspace, record, address[1], read_only=False)
         if found is not None:
             with found as store:
-                store.remove_block(place[2])
-        self._forget(_AT, _key(place))
+                store.remove_block(address[2])
+        self._forget(_AT, _key(address))
 
     def _forget(self, condition: str, values: tuple[str | int, ...]) -> bool:
         with self._database.transaction() as db:
@@ -124,11 +124,11 @@ class OnDemandCache:
         return True
 
 
-def _key(place: Place) -> tuple[str | int, ...]:
-    rendering, track, block = place
+def _key(address: BlockAddress) -> tuple[str | int, ...]:
+    rendering, track, block = address
     return (rendering, track, *block)
 
 
-def _place(row: Iterable[str | int]) -> Place:
+def _address(row: Iterable[str | int]) -> BlockAddress:
     rendering, track, z, x, y = row
     return str(rendering), str(track), BlockId(int(z), int(x), int(y))

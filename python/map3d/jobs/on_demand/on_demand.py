@@ -14,7 +14,7 @@ from map3d.errors import BadName, Map3dError, NotFound
 from map3d.jobs.dead_workers import expire_dead_workers, worker_name
 from map3d.jobs.finish_process import finish_in_subprocess
 from map3d.jobs.on_demand.block_requests import BlockRequest, BlockRequests
-from map3d.jobs.on_demand.cache import OnDemandCache, Place
+from map3d.jobs.on_demand.cache import BlockAddress, OnDemandCache
 from map3d.jobs.on_demand.worker import OnDemandSettings, OnDemandWorker, check_can_be_done, find_job
 from map3d.tiles.decode_tile import find_layer
 from map3d.types import BlockId
@@ -51,7 +51,7 @@ class OnDemand:
         self._stop = threading.Event()
         self._lock = threading.Lock()
         self._known: dict[str, _Known] = {}
-        self._touched: set[Place] = set()
+        self._touched: set[BlockAddress] = set()
         self._unfinished: dict[str, float] = {}
         self._threads: list[threading.Thread] = []
 
@@ -140,7 +140,7 @@ class OnDemand:
     def _end_met(self) -> None:
         """Ends the requests whose jobs other processes have done."""
         for request in self.requests:
-            if self.open_job(*request.place) is None:
+            if self.open_job(*request.address) is None:
                 self.requests.end(request)
 
     def _refresh(self) -> None:
@@ -157,7 +157,7 @@ class OnDemand:
             touched, self._touched = self._touched, set()
         if touched:
             self.cache.touch(touched)
-        for name in {request.place[0] for request in self.requests}:
+        for name in {request.address[0] for request in self.requests}:
             expire_dead_workers(self._catalogue, name)
 
     def _write_manifests(self) -> None:

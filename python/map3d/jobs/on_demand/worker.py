@@ -102,13 +102,13 @@ class OnDemandWorker:
                 self._close()
                 self._requests.end(request, error)
             except Exception as error:
-                log.exception("cannot render block %s of %s", request.place[2], request.place[0])
+                log.exception("cannot render block %s of %s", request.address[2], request.address[0])
                 self._close()
                 self._requests.end(request, error)
         return False
 
     def _work_on(self, request: BlockRequest) -> bool:
-        rendering, track, block = request.place
+        rendering, track, block = request.address
         job = self._catalogue.job(rendering, track, block)
         if job is None or job.state is State.DONE:
             self._requests.end(request)

@@ -52,7 +52,7 @@ def _check_workspace(workspace: Workspace, writes: bool) -> None:
 
 
 def _check_catalogue(workspace: Workspace, catalogue: Catalogue) -> None:
-    """A look at the database's clock takes the way of every request; it changes nothing."""
+    """Reading the database clock uses the same connection as requests and has no side effect."""
     check_alive(workspace, catalogue)
     catalogue.clock_s()
 

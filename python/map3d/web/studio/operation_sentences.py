@@ -89,7 +89,7 @@ LINES: Final = (
     N_("cancelled"),
     N_("done: {message}"),
     N_("failed: {message}"),
-    N_("its worker ended {count} times before the operation did; look for what kills it, then retry"),
+    N_("the worker died {count} times during this operation; fix the cause, then retry"),
     N_("… {count} lines are not kept …"),
     N_("{file}: two of the uploaded files have this name; import them one after another"),
 )

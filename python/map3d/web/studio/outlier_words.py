@@ -18,7 +18,7 @@ MAX_PLACES: Final = 5
 
 
 @dataclass(frozen=True)
-class Place:
+class ClusterChoice:
     """`number`: that of the cluster; `kept`: it is in the scene; `is_stray`: it has no whole object and is not offered."""
 
     number: int
@@ -35,7 +35,7 @@ class OutlierWords:
     triangles: int
     files: tuple[str, ...]
     more: int
-    places: tuple[Place, ...]
+    places: tuple[ClusterChoice, ...]
     keeps_all: bool
     has_choice: bool
 
@@ -62,8 +62,8 @@ def _file_text(file: FileOutliers) -> str:
     return _("{file}: {triangles}, up to {distance} away, e.g. of {name}", **values)
 
 
-def _places(clusters: Sequence[Cluster], kept: Sequence[int], crs: SceneCrs | None) -> tuple[Place, ...]:
-    return tuple(Place(cluster.number, _place_text(cluster, crs), cluster.number in kept, cluster.objects == 0) for cluster in clusters)
+def _places(clusters: Sequence[Cluster], kept: Sequence[int], crs: SceneCrs | None) -> tuple[ClusterChoice, ...]:
+    return tuple(ClusterChoice(cluster.number, _place_text(cluster, crs), cluster.number in kept, cluster.objects == 0) for cluster in clusters)
 
 
 def _place_text(cluster: Cluster, crs: SceneCrs | None) -> str:

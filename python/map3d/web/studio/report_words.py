@@ -9,7 +9,7 @@ from map3d.web.pages.tools import translate as _
 
 
 @dataclass(frozen=True)
-class AssetSummary:
+class AssetRow:
     """An imported file in a list. `format`: the title of its format."""
 
     name: str
@@ -20,11 +20,11 @@ class AssetSummary:
     problems: int
 
 
-def summary_of(asset: AssetRecord) -> AssetSummary:
+def summary_of(asset: AssetRecord) -> AssetRow:
     report = asset.report
     problems = sum(found.count for found in findings(report))
     source = asset.source.rsplit("/", 1)[-1]
-    return AssetSummary(asset.name, source, title_of(asset.format), report.get("objects", 0), report.get("triangles", 0), problems)
+    return AssetRow(asset.name, source, title_of(asset.format), report.get("objects", 0), report.get("triangles", 0), problems)
 
 
 def missing_files(asset: AssetRecord) -> list[str]:

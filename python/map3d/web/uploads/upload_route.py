@@ -45,7 +45,7 @@ Result = TypeVar("Result")
 
 
 class _Refused(Exception):
-    """A response without a message of the other rooms."""
+    """An error response of this route."""
 
     def __init__(self, status: int, text: str, headers: Mapping[str, str] | None = None) -> None:
         super().__init__(text)

@@ -185,8 +185,8 @@ impl CityObjectParser<'_> {
             Ok(file) => file,
             Err(error) => return self.report.skip(error.reason(RELIEF), || name),
         };
-        if let Some(oddity) = file.oddity {
-            self.report.note(oddity, name.as_str());
+        if let Some(note) = file.note {
+            self.report.note(note, name.as_str());
         }
         let lod = self.relief_lod(number);
         let index = self.city_object.grids.len() as u32;

@@ -68,8 +68,8 @@ impl MaterialLibrary {
     fn load_named(&mut self, name: &str, folder: &mut AssetFolder, report: &mut ReportBuilder) -> Result<()> {
         match folder.find(name) {
             Ok(file) => {
-                if let Some(oddity) = file.oddity {
-                    report.note(oddity, name);
+                if let Some(note) = file.note {
+                    report.note(note, name);
                 }
                 let slashed = name.replace('\\', "/");
                 let prefix = slashed.rsplit_once('/').map_or("", |(prefix, _)| prefix);

@@ -1,4 +1,4 @@
-"""Blocks of all views that show the same ground have neighbouring ground numbers."""
+"""Blocks of all views that show the same ground have neighbouring Hilbert indices."""
 
 from itertools import pairwise
 
@@ -7,9 +7,9 @@ import pytest
 
 from map3d.catalogue import RenderingRecord
 from map3d.geometry.frames import PinnedFrame, Window, pin
-from map3d.geometry.hilbert import hilbert_numbers
+from map3d.geometry.hilbert import hilbert_indices
 from map3d.geometry.views import uvd_from_local
-from map3d.renderings.ground_numbers import GROUND_LEVEL, GROUND_NUMBERS, GroundNumbers
+from map3d.renderings.hilbert_indices import GROUND_LEVEL, HILBERT_INDICES, HilbertIndices
 from map3d.types import Box, ViewAngles
 
 BOX: Box = ((-300.0, 100.0, 40.0), (700.0, 900.0, 60.0))
@@ -34,18 +34,18 @@ def tile_at(frame: PinnedFrame, ground: tuple[float, float]) -> np.ndarray:
 
 @pytest.mark.parametrize("ground", [(-299.0, 101.0), (0.0, 500.0), (207.0, 357.0), (699.0, 899.0)])
 def test_tiles_of_all_views_at_a_point_have_the_number_of_its_square(ground: tuple[float, float]) -> None:
-    numbers = GroundNumbers(record())
+    numbers = HilbertIndices(record())
     column, row = ((ground[k] - BOX[0][k]) * 2**COARSE / 1000 for k in range(2))
-    expected = int(hilbert_numbers(COARSE, int(column), int(row)))
+    expected = int(hilbert_indices(COARSE, int(column), int(row)))
     for frame in record().frames:
         assert numbers.of(frame, DEEP, tile_at(frame, ground))[0] >> 2 * (GROUND_LEVEL - COARSE) == expected, frame.id
 
 
 def test_ground_beside_the_scene_gets_the_nearest_square() -> None:
-    numbers = GroundNumbers(record())
+    numbers = HilbertIndices(record())
     for frame in record().frames:
         corners = np.array([[0, 0], [0, 7], [7, 0], [7, 7]])
-        assert ((numbers.of(frame, 3, corners) >= 0) & (numbers.of(frame, 3, corners) < GROUND_NUMBERS)).all()
+        assert ((numbers.of(frame, 3, corners) >= 0) & (numbers.of(frame, 3, corners) < HILBERT_INDICES)).all()
 
 
 def test_blocks_that_are_neighbours_on_the_curve_are_neighbours_on_the_ground() -> None:
@@ -53,7 +53,7 @@ def test_blocks_that_are_neighbours_on_the_curve_are_neighbours_on_the_ground() 
     box: Box = ((0.0, 0.0, 0.0), (1000.0, 1000.0, 20.0))
     frames = tuple(pin(box, 256, 0.02, [ViewAngles(look_at, 45) for look_at in (0, 90, 180, 270)]))
     rendering = RenderingRecord("town-a", "town", 0.02, ((),), frames, box)
-    numbers, found, level = GroundNumbers(rendering), [], 6
+    numbers, found, level = HilbertIndices(rendering), [], 6
     places = np.stack([axis.ravel() for axis in np.meshgrid(np.arange(2**level), np.arange(2**level))], axis=1)
     centres = np.stack([axis.ravel() for axis in np.meshgrid(np.arange(5, 1000, 10.0), np.arange(5, 1000, 10.0))] + [np.full(10_000, 10.0)], axis=1)
     for frame in frames:
@@ -76,7 +76,7 @@ def test_the_ground_of_a_window_has_finer_squares() -> None:
     small = record(window)
     places = np.stack([axis.ravel() for axis in np.meshgrid(np.arange(8), np.arange(8))], axis=1)
     squares = {
-        name: len(np.unique(GroundNumbers(each).of(small.frames[0], 3, places) >> 2 * (GROUND_LEVEL - COARSE)))
+        name: len(np.unique(HilbertIndices(each).of(small.frames[0], 3, places) >> 2 * (GROUND_LEVEL - COARSE)))
         for name, each in (("window", small), ("scene", record()))
     }
     assert squares["window"] > 4 * squares["scene"]

@@ -1,6 +1,6 @@
-"""Pieces of long imports: what is finished before all is. They outlive a killed import and serve the next one of the same inputs.
+"""Checkpoints of long imports: finished parts that outlive a killed import and serve the next one of the same inputs.
 
-The folder `.NAME.KEY.pieces` lies beside the asset; KEY is the digest of everything that the pieces depend on. Pieces of other inputs are removed.
+The folder `.NAME.KEY.pieces` lies beside the asset; KEY is the digest of everything that they depend on. Checkpoints of other inputs are removed.
 """
 
 import fcntl
@@ -17,18 +17,18 @@ from typing import Any, Final
 _SUFFIX: Final = ".pieces"
 _LOCK: Final = "lock"
 KEEP_S: Final = 7 * 86_400.0
-"""Pieces of an asset that is not imported again are removed after a week."""
+"""Checkpoints of an asset that is not imported again are removed after a week."""
 
 
-def pieces_key(inputs: Mapping[str, Any]) -> str:
-    """`inputs`: JSON values on which the pieces depend."""
+def checkpoints_key(inputs: Mapping[str, Any]) -> str:
+    """`inputs`: JSON values on which the checkpoints depend."""
     return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()[:32]
 
 
 @contextmanager
-def import_pieces(asset: Path, key: str) -> Iterator[Path | None]:
-    """Yields the folder for the pieces of an asset, locked; None while another process imports the same. Removes it unless an exception leaves the
-    block: then the next import may resume with it."""
+def import_checkpoints(asset: Path, key: str) -> Iterator[Path | None]:
+    """Yields the folder for the checkpoints of an asset, locked; None while another process imports the same. Removes it
+    unless an exception leaves the block: then the next import may resume with it."""
     _remove_others(asset.parent, asset.name, key)
     folder = asset.with_name(f".{asset.name}.{key}{_SUFFIX}")
     folder.mkdir(parents=True, exist_ok=True)
@@ -44,13 +44,13 @@ def import_pieces(asset: Path, key: str) -> Iterator[Path | None]:
         os.close(lock)
 
 
-def remove_pieces(asset: Path) -> None:
-    """Removes the pieces of an asset, unless a process uses them."""
+def remove_checkpoints(asset: Path) -> None:
+    """Removes the checkpoints of an asset, unless a process uses them."""
     _remove_others(asset.parent, asset.name, None)
 
 
 def _remove_others(assets: Path, name: str, key: str | None) -> None:
-    """Removes the asset's pieces of other inputs, and old pieces of any asset."""
+    """Removes the asset's checkpoints of other inputs, and old checkpoints of any asset."""
     for path in assets.glob(f".*{_SUFFIX}"):
         owner, _, found = path.name.removesuffix(_SUFFIX).removeprefix(".").partition(".")
         if (owner == name and found != key) or (owner != name and time.time() - path.stat().st_mtime > KEEP_S):

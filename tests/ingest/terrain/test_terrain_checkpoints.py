@@ -1,4 +1,4 @@
-"""Terrain is the same whatever the number of threads, and an import that was killed resumes with its finished pieces."""
+"""Terrain is the same whatever the number of threads, and an import that was killed resumes with its finished checkpoints."""
 
 import os
 import shutil
@@ -14,12 +14,12 @@ from pyproj import CRS
 pytest.importorskip("map3d._core", reason="the compiled core is not built")
 
 from map3d.catalogue import SceneRecord, Workspace
+from map3d.ingest.import_checkpoints import checkpoints_key, import_checkpoints
 from map3d.ingest.import_options import ImportOptions
-from map3d.ingest.import_pieces import import_pieces, pieces_key
 from map3d.ingest.import_progress import ImportProgress
 from map3d.ingest.importing import import_file
 from map3d.ingest.sources import find_sources
-from map3d.ingest.terrain import terrain_pieces
+from map3d.ingest.terrain import terrain_checkpoints
 from map3d.ingest.terrain.parse_terrain import worker_count
 from map3d.ingest.terrain.terrain_import import import_terrain
 from map3d.ingest.terrain.terrain_options import TerrainOptions
@@ -31,10 +31,10 @@ TILES = 7 * 7
 KILLED = """
 import os, sys
 from pathlib import Path
-from tests.ingest.terrain import test_terrain_pieces as test
-from map3d.ingest.terrain import terrain_pieces
+from tests.ingest.terrain import test_terrain_checkpoints as test
+from map3d.ingest.terrain import terrain_checkpoints
 
-original, left = terrain_pieces._write_piece, [int(sys.argv[2])]
+original, left = terrain_checkpoints._write_checkpoint, [int(sys.argv[2])]
 
 def kill(*arguments):
     left[0] -= 1
@@ -42,15 +42,15 @@ def kill(*arguments):
         os.kill(os.getpid(), 9)
     return original(*arguments)
 
-terrain_pieces._write_piece = kill
-test.run(Path(sys.argv[1]), "killed", workers=2, pieces=Path(sys.argv[1], "pieces"))
+terrain_checkpoints._write_checkpoint = kill
+test.run(Path(sys.argv[1]), "killed", workers=2, checkpoints=Path(sys.argv[1], "checkpoints"))
 """
 
 
-def run(folder: Path, name: str, pieces: Path | None = None, **options: object) -> dict[str, bytes]:
+def run(folder: Path, name: str, checkpoints: Path | None = None, **options: object) -> dict[str, bytes]:
     """Imports the rasters of `folder`; returns the asset's files."""
     terrain = TerrainOptions(tile_cells=16, **options)  # type: ignore[arg-type]
-    import_terrain(folder / "dem.tif", folder / "ortho.tif", folder / name, UTM, terrain, pieces=pieces)
+    import_terrain(folder / "dem.tif", folder / "ortho.tif", folder / name, UTM, terrain, checkpoints=checkpoints)
     return read_files(folder / name)
 
 
@@ -72,24 +72,24 @@ def test_the_asset_does_not_depend_on_the_number_of_threads(rasters: Path, error
     assert set(one) > {"mesh.m3a", "materials.json", "objects.jsonl", "report.json"}
 
 
-def test_pieces_of_several_tiles_give_the_same_asset(rasters: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_checkpoints_of_several_tiles_give_the_same_asset(rasters: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = run(rasters, "single")
-    monkeypatch.setattr(terrain_pieces, "PIECES", 10)
-    assert run(rasters, "several", pieces=rasters / "pieces", workers=2) == expected
-    assert len(list((rasters / "pieces").glob("*.zip"))) == 10
+    monkeypatch.setattr(terrain_checkpoints, "CHECKPOINTS", 10)
+    assert run(rasters, "several", checkpoints=rasters / "checkpoints", workers=2) == expected
+    assert len(list((rasters / "checkpoints").glob("*.zip"))) == 10
 
 
 @pytest.mark.parametrize("finished", [0, 20])
-def test_a_killed_import_goes_on_with_its_finished_pieces(rasters: Path, monkeypatch: pytest.MonkeyPatch, finished: int) -> None:
+def test_a_killed_import_resumes_from_its_checkpoints(rasters: Path, monkeypatch: pytest.MonkeyPatch, finished: int) -> None:
     expected = run(rasters, "undisturbed")
     command = [sys.executable, "-c", KILLED, str(rasters), str(finished)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path or os.getcwd() for path in sys.path)}
     assert subprocess.run(command, check=False, env=environment, timeout=60).returncode == -signal.SIGKILL
-    pieces = rasters / "pieces"
-    there = len(list(pieces.glob("*.zip")))
-    assert finished - 1 <= there <= finished, "with two threads, one piece may be unfinished"
+    checkpoints = rasters / "checkpoints"
+    there = len(list(checkpoints.glob("*.zip")))
+    assert finished - 1 <= there <= finished, "with two threads, one checkpoint may be unfinished"
     built = count_tiles(monkeypatch)
-    assert run(rasters, "resumed", pieces, workers=2) == expected
+    assert run(rasters, "resumed", checkpoints, workers=2) == expected
     assert len(built) == TILES - there
 
 
@@ -105,21 +105,21 @@ def count_tiles(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     return built
 
 
-def test_a_damaged_piece_and_one_without_its_texture_are_built_again(rasters: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pieces = rasters / "pieces"
-    expected = run(rasters, "undisturbed", pieces)
-    os.truncate(pieces / "3.zip", 100)
-    piece = terrain_pieces.TerrainPiece.read(pieces / "10.zip")
-    assert piece is not None
-    ((name, size),) = piece.textures()
-    (pieces / "textures" / name).unlink()
-    (pieces / "textures" / name).write_bytes(b"x" * (size - 1))
+def test_a_damaged_checkpoint_and_one_without_its_texture_are_built_again(rasters: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    checkpoints = rasters / "checkpoints"
+    expected = run(rasters, "undisturbed", checkpoints)
+    os.truncate(checkpoints / "3.zip", 100)
+    checkpoint = terrain_checkpoints.TerrainCheckpoint.read(checkpoints / "10.zip")
+    assert checkpoint is not None
+    ((name, size),) = checkpoint.textures()
+    (checkpoints / "textures" / name).unlink()
+    (checkpoints / "textures" / name).write_bytes(b"x" * (size - 1))
     built = count_tiles(monkeypatch)
-    assert run(rasters, "repaired", pieces) == expected
+    assert run(rasters, "repaired", checkpoints) == expected
     assert len(built) == 2
 
 
-def test_an_error_in_a_thread_ends_the_import_and_leaves_finished_pieces(rasters: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_in_a_thread_ends_the_import_and_leaves_finished_checkpoints(rasters: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     expected, original = run(rasters, "undisturbed"), TileBuilder.build
 
     def fail(self: TileBuilder, tile: object, *arguments: object) -> object:
@@ -129,35 +129,35 @@ def test_an_error_in_a_thread_ends_the_import_and_leaves_finished_pieces(rasters
 
     monkeypatch.setattr(TileBuilder, "build", fail)
     with pytest.raises(OSError, match="the disk is full"):
-        run(rasters, "failed", rasters / "pieces", workers=2)
+        run(rasters, "failed", rasters / "checkpoints", workers=2)
     monkeypatch.setattr(TileBuilder, "build", original)
     built = count_tiles(monkeypatch)
-    assert run(rasters, "resumed", rasters / "pieces") == expected
+    assert run(rasters, "resumed", rasters / "checkpoints") == expected
     assert 0 < len(built) <= TILES - 3 * 7 - 3
 
 
 def interrupted(asset: Path, inputs: str) -> tuple[Path, set[str]]:
-    """Returns the folder of an import that stops after its first piece, and what was in it before."""
-    with suppress(KeyboardInterrupt), import_pieces(asset, pieces_key({"files": inputs})) as folder:
+    """Returns the folder of an import that stops after its first checkpoint, and what was in it before."""
+    with suppress(KeyboardInterrupt), import_checkpoints(asset, checkpoints_key({"files": inputs})) as folder:
         assert folder is not None
         there = {path.name for path in folder.glob("*.zip")}
-        (folder / "0.zip").write_bytes(b"piece")
+        (folder / "0.zip").write_bytes(b"checkpoint")
         raise KeyboardInterrupt
     return folder, there
 
 
-def test_pieces_of_other_inputs_are_removed(tmp_path: Path) -> None:
+def test_checkpoints_of_other_inputs_are_removed(tmp_path: Path) -> None:
     asset = tmp_path / "terrain"
     assert interrupted(asset, "a")[1] == set()
     folder, there = interrupted(asset, "a")
     assert there == {"0.zip"}
-    with import_pieces(tmp_path / "other", pieces_key({})) as other:
+    with import_checkpoints(tmp_path / "other", checkpoints_key({})) as other:
         assert folder.exists()
-        with import_pieces(tmp_path / "other", pieces_key({})) as locked:
+        with import_checkpoints(tmp_path / "other", checkpoints_key({})) as locked:
             assert locked is None, "another import uses it"
         assert other is not None
         assert other.exists()
-    with import_pieces(asset, pieces_key({"files": "b"})) as new:
+    with import_checkpoints(asset, checkpoints_key({"files": "b"})) as new:
         assert new is not None
         assert not folder.exists()
     assert list(tmp_path.iterdir()) == []
@@ -167,7 +167,7 @@ KILLED_IMPORT = """
 import os, sys
 from pathlib import Path
 from map3d.ingest.import_progress import ImportProgress
-from tests.ingest.terrain import test_terrain_pieces as test
+from tests.ingest.terrain import test_terrain_checkpoints as test
 
 def kill(self, counts):
     if counts["done"] >= 5:
@@ -189,7 +189,7 @@ def import_into(root: Path, folder: Path) -> Path:
     return workspace.scene_folder("town") / "assets"
 
 
-def test_an_import_into_a_scene_goes_on_after_it_was_killed(tmp_path: Path) -> None:
+def test_an_import_into_a_scene_resumes_after_it_was_killed(tmp_path: Path) -> None:
     write(tmp_path / "dem.tif", hills(200, 200), 10.0)
     write(tmp_path / "ortho.tif", colours(4000, 4000), 0.5)
     # In the same place, because reports know their workspace.

@@ -1,4 +1,4 @@
-"""Ground numbers: the order in which the base blocks of all views of a rendering are leased (spec/catalogue.md, Jobs)."""
+"""Hilbert indices: the order in which the base blocks of all views of a rendering are leased (spec/catalogue.md, Jobs)."""
 
 from typing import Final
 
@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from map3d.catalogue import RenderingRecord
 from map3d.geometry.frames import PinnedFrame
-from map3d.geometry.hilbert import hilbert_numbers
+from map3d.geometry.hilbert import hilbert_indices
 
 GROUND_LEVEL: Final = 20
 """The ground has 2^20 × 2^20 squares."""
-GROUND_NUMBERS: Final = 1 << 2 * GROUND_LEVEL
+HILBERT_INDICES: Final = 1 << 2 * GROUND_LEVEL
 
 
-class GroundNumbers:
+class HilbertIndices:
     """The ground of a rendering: the horizontal square around the scene's box, or around the part of the box that a window shows, at half the box's
     height."""
 
@@ -28,7 +28,7 @@ class GroundNumbers:
         self._height_m = (record.box[0][2] + record.box[1][2]) / 2
 
     def of(self, frame: PinnedFrame, z: int, places: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Returns the ground numbers of tiles of level z, (n, 2) columns and rows: the Hilbert number of the square of the ground that is visible at
+        """Returns the Hilbert indices of tiles of level z, (n, 2) columns and rows: that of the square of the ground that is visible at
         the tile's centre, or of the nearest square where that point lies beside the ground."""
         tile_m = frame.size_m / 2.0**z
         u, v = frame.u0_m + (places[:, 0] + 0.5) * tile_m, frame.v0_m - (places[:, 1] + 0.5) * tile_m
@@ -37,4 +37,4 @@ class GroundNumbers:
         ground = np.stack([u * right[k] + along * up[k] for k in range(2)], axis=-1)
         squares = np.floor((ground - self._low) / self._side_m * 2.0**GROUND_LEVEL)
         column, row = np.clip(squares, 0, 2**GROUND_LEVEL - 1).astype(np.int64).T
-        return hilbert_numbers(GROUND_LEVEL, column, row)
+        return hilbert_indices(GROUND_LEVEL, column, row)

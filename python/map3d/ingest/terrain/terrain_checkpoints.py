@@ -1,7 +1,7 @@
-"""Pieces of a terrain: runs of tiles that threads build and store, each in one file, until the asset is written.
+"""Checkpoints of a terrain: runs of tiles that threads build and store, each in one file, until the asset is written.
 
-A piece is renamed into place when it is complete. An import that was killed uses the pieces that it finds; the folder belongs to one set of rasters
-and options (map3d.ingest.import_pieces), so that others start from scratch.
+A checkpoint is renamed into place when it is complete. An import that was killed uses the checkpoints that it finds; the folder belongs to one set
+of rasters and options (map3d.ingest.import_checkpoints), so that others start from scratch.
 """
 
 import json
@@ -23,18 +23,18 @@ from map3d.ingest.terrain.orthophoto import TextureTile
 from map3d.ingest.terrain.terrain_tiles import TerrainTile, TileBuilder, TileCounts
 from map3d.ingest.terrain.vertex_grid import GridTile
 
-PIECES: Final = 1000
-"""Pieces of a terrain, about; fewer tiles than this are a piece each."""
+CHECKPOINTS: Final = 1000
+"""Approximate number of checkpoints of a terrain; a terrain with fewer tiles has one for each."""
 
-MAX_PIECE_TILES: Final = 64
+MAX_CHECKPOINT_TILES: Final = 64
 GDAL_CACHE_MB: Final = 64
 _TABLE: Final = "tiles.json"
 _ARRAYS: Final = ("positions", "triangles", "uvs")
 
 
 @dataclass(frozen=True)
-class TerrainPiece:
-    """A stored piece."""
+class TerrainCheckpoint:
+    """A stored checkpoint."""
 
     path: Path
     counts: TileCounts
@@ -42,15 +42,15 @@ class TerrainPiece:
 
     @classmethod
     def read(cls, path: Path) -> Self | None:
-        """Returns None for an absent or damaged piece, or one whose textures are not there."""
+        """Returns None for an absent or damaged checkpoint, or one whose textures are not there."""
         try:
             with zipfile.ZipFile(path) as file:
                 table = json.loads(file.read(_TABLE))
-            piece = cls(path, TileCounts(**table["counts"]), table["tiles"])
-            sizes_match = all((texture_folder(path.parent) / name).stat().st_size == size for name, size in piece.textures())
+            checkpoint = cls(path, TileCounts(**table["counts"]), table["tiles"])
+            sizes_match = all((texture_folder(path.parent) / name).stat().st_size == size for name, size in checkpoint.textures())
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
             return None
-        return piece if sizes_match else None
+        return checkpoint if sizes_match else None
 
     def textures(self) -> Iterator[tuple[str, int]]:
         """Yields the names and sizes in bytes of the image files."""
@@ -66,28 +66,28 @@ class TerrainPiece:
                 yield TerrainTile(row["row"], row["column"], positions, triangles, uvs, texture)
 
 
-def texture_folder(pieces: Path) -> Path:
-    """Returns the folder for the textures of the pieces."""
-    return pieces / "textures"
+def texture_folder(checkpoints: Path) -> Path:
+    """Returns the folder for the textures of the checkpoints."""
+    return checkpoints / "textures"
 
 
-def build_pieces(
+def build_checkpoints(
     tiles: Iterable[GridTile], tile_count: int, folder: Path, workers: int, open_builder: Callable[[], TileBuilder]
-) -> Generator[tuple[TerrainPiece, int], None, None]:
-    """Yields the pieces in order, with the numbers of tiles that `tiles` had in them; builds those that are not in `folder`.
+) -> Generator[tuple[TerrainCheckpoint, int], None, None]:
+    """Yields the checkpoints in order, with the numbers of tiles that `tiles` had in them; builds those that are not in `folder`.
 
-    `workers`: threads, each of which opens a builder. A thread that waits for others has at most a few pieces in advance. Raises ImportFailed.
+    `workers`: threads, each of which opens a builder. A thread that waits for others has at most a few checkpoints in advance. Raises ImportFailed.
     """
     texture_folder(folder).mkdir(parents=True, exist_ok=True)
     for left in folder.glob("*.new"):
         left.unlink(missing_ok=True)
-    source = enumerate(_runs(tiles, min(MAX_PIECE_TILES, -(-tile_count // PIECES))))
+    source = enumerate(_runs(tiles, min(MAX_CHECKPOINT_TILES, -(-tile_count // CHECKPOINTS))))
     with _Builders(open_builder) as builders, ThreadPoolExecutor(workers) as pool:
-        waiting: list[tuple[Future[TerrainPiece], int]] = []
+        waiting: list[tuple[Future[TerrainCheckpoint], int]] = []
         try:
             while True:
                 for number, run in islice(source, 2 * workers - len(waiting)):
-                    waiting.append((pool.submit(_get_piece, folder / f"{number}.zip", run, builders), len(run)))
+                    waiting.append((pool.submit(_get_checkpoint, folder / f"{number}.zip", run, builders), len(run)))
                 if not waiting:
                     return
                 future, count = waiting.pop(0)
@@ -125,15 +125,15 @@ def _runs(tiles: Iterable[GridTile], length: int) -> Iterator[list[GridTile]]:
         yield run
 
 
-def _get_piece(path: Path, run: list[GridTile], builders: _Builders) -> TerrainPiece:
-    known = TerrainPiece.read(path)
+def _get_checkpoint(path: Path, run: list[GridTile], builders: _Builders) -> TerrainCheckpoint:
+    known = TerrainCheckpoint.read(path)
     if known is not None:
         return known
     with rasterio.Env(GDAL_CACHEMAX=GDAL_CACHE_MB):
-        return _write_piece(path, run, builders.get())
+        return _write_checkpoint(path, run, builders.get())
 
 
-def _write_piece(path: Path, run: list[GridTile], builder: TileBuilder) -> TerrainPiece:
+def _write_checkpoint(path: Path, run: list[GridTile], builder: TileBuilder) -> TerrainCheckpoint:
     textures, counts = texture_folder(path.parent), TileCounts()
     rows: list[dict[str, Any]] = []
     draft = path.with_name(f"{path.name}.{os.getpid()}-{threading.get_ident()}.new")
@@ -150,7 +150,7 @@ def _write_piece(path: Path, run: list[GridTile], builder: TileBuilder) -> Terra
         with suppress(OSError):
             draft.unlink()
         raise
-    return TerrainPiece(path, counts, rows)
+    return TerrainCheckpoint(path, counts, rows)
 
 
 def _row(tile: TerrainTile, textures: Path) -> dict[str, Any]:

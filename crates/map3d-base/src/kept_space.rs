@@ -23,7 +23,7 @@ impl Region {
 
 /// World coordinates. Small triangles stay if they lie in the box of a region; larger ones, such as those of terrain, may reach beyond it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Extent {
+pub struct KeptSpace {
     pub regions: Vec<Region>,
     /// Triangles whose box has a shorter diagonal are small.
     pub large_m: f64,
@@ -31,7 +31,7 @@ pub struct Extent {
     pub all_around: Option<Vec3>,
 }
 
-impl Extent {
+impl KeptSpace {
     pub fn keeps(&self, corners: [Vec3; 3]) -> bool {
         if let Some(origin) = self.all_around {
             return corners.iter().all(|p| is_near(*p, origin));
@@ -81,9 +81,9 @@ fn is_near(p: Vec3, origin: Vec3) -> bool {
 mod tests {
     use super::*;
 
-    fn extent() -> Extent {
+    fn extent() -> KeptSpace {
         let bounds = Box3 { lo: [5000.0, 5000.0, 0.0], hi: [6000.0, 6000.0, 50.0] };
-        Extent { regions: vec![Region { bounds, reach_m: [10_000.0, 3000.0] }], large_m: 2048.0, all_around: None }
+        KeptSpace { regions: vec![Region { bounds, reach_m: [10_000.0, 3000.0] }], large_m: 2048.0, all_around: None }
     }
 
     fn triangle(a: Vec3, size_m: f64) -> [Vec3; 3] {
@@ -111,7 +111,7 @@ mod tests {
 
     #[test]
     fn everything_stays_up_to_the_limit_around_a_point() {
-        let extent = Extent { all_around: Some([4e6, 0.0, 0.0]), ..extent() };
+        let extent = KeptSpace { all_around: Some([4e6, 0.0, 0.0]), ..extent() };
         assert!(extent.keeps_point([1.04e8, 0.0, 0.0]));
         assert!(!extent.keeps_point([1.0401e8, 0.0, 0.0]));
         assert!(!extent.keeps_point([0.0, 0.0, 1e300]));

@@ -46,23 +46,23 @@ fn default_color(class: SurfaceClass, tone: usize) -> [u8; 3] {
     }
 }
 
-/// All that the colours of an object's surfaces depend on.
+/// The colours of an object's surfaces by class, as what they depend on.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
-struct Look {
+struct Palette {
     tone: u8,
     is_building: bool,
     /// Rules whose conditions on the object hold, in order.
     rules: Vec<u16>,
 }
 
-/// The looks of an asset's objects. Look 0 is that of prototypes, which many objects share.
+/// The colours of an asset's objects: a palette for each. Palette 0 is that of prototypes, which many objects share.
 #[derive(Default)]
-pub(crate) struct Looks {
-    looks: Vec<Look>,
+pub(crate) struct SurfaceColors {
+    palettes: Vec<Palette>,
     by_object: Vec<u32>,
 }
 
-impl Looks {
+impl SurfaceColors {
     /// Reads an asset's `objects.jsonl`.
     pub fn read(path: &Path, rules: &[StyleRule]) -> Result<Self> {
         let file = std::fs::File::open(path).map_err(|e| Error::storage(path, e))?;
@@ -76,42 +76,42 @@ impl Looks {
     }
 
     fn of_objects(objects: &[ObjectFacts], rules: &[StyleRule]) -> Self {
-        let mut looks = vec![Look { rules: unconditional(rules), ..Look::default() }];
-        let mut known: HashMap<Look, u32> = HashMap::from([(looks[0].clone(), 0)]);
+        let mut palettes = vec![Palette { rules: unconditional(rules), ..Palette::default() }];
+        let mut known: HashMap<Palette, u32> = HashMap::from([(palettes[0].clone(), 0)]);
         let by_object = (0..objects.len()).map(|number| {
-            let look = look_of(objects, number, rules);
-            if let Some(known) = known.get(&look) {
+            let palette = palette_of(objects, number, rules);
+            if let Some(known) = known.get(&palette) {
                 return *known;
             }
-            known.insert(look.clone(), looks.len() as u32);
-            looks.push(look);
-            looks.len() as u32 - 1
+            known.insert(palette.clone(), palettes.len() as u32);
+            palettes.push(palette);
+            palettes.len() as u32 - 1
         });
         let by_object = by_object.collect();
-        Self { looks, by_object }
+        Self { palettes, by_object }
     }
 
     pub fn len(&self) -> usize {
-        self.looks.len()
+        self.palettes.len()
     }
 
-    /// Returns the look of an object; of a prototype without one.
+    /// Returns the index of an object's palette; that of prototypes for `None`.
     pub fn of(&self, object: Option<u32>) -> usize {
-        object.and_then(|o| self.by_object.get(o as usize)).map_or(0, |look| *look as usize)
+        object.and_then(|o| self.by_object.get(o as usize)).map_or(0, |palette| *palette as usize)
     }
 
     /// Returns the colour of a surface as sRGB and opacity.
-    pub fn color(&self, look: usize, class: SurfaceClass, rules: &[StyleRule]) -> [u8; 4] {
-        let look = &self.looks[look];
-        let rule = look.rules.iter().map(|k| &rules[usize::from(*k)]).find(|r| r.surface.is_none_or(|s| s == class));
-        let [r, g, b] = rule.map_or_else(|| default_color(class, usize::from(look.tone)), |r| r.color);
+    pub fn color(&self, palette: usize, class: SurfaceClass, rules: &[StyleRule]) -> [u8; 4] {
+        let palette = &self.palettes[palette];
+        let rule = palette.rules.iter().map(|k| &rules[usize::from(*k)]).find(|r| r.surface.is_none_or(|s| s == class));
+        let [r, g, b] = rule.map_or_else(|| default_color(class, usize::from(palette.tone)), |r| r.color);
         [r, g, b, 255]
     }
 
     /// Returns the class of a triangle's surface: where the source does not say, what a building has in that direction. `up`: the z of its unit normal.
-    pub fn class(&self, look: usize, class: SurfaceClass, up: impl FnOnce() -> f64) -> SurfaceClass {
+    pub fn class(&self, palette: usize, class: SurfaceClass, up: impl FnOnce() -> f64) -> SurfaceClass {
         match class {
-            SurfaceClass::Other if self.looks[look].is_building => {
+            SurfaceClass::Other if self.palettes[palette].is_building => {
                 if up() > ROOF_UP {
                     SurfaceClass::Roof
                 } else {
@@ -126,7 +126,7 @@ impl Looks {
 /// The z of the unit normal above which a building's surface is a roof: up to 70° steep.
 const ROOF_UP: f64 = 0.34;
 
-/// What the look of an object depends on.
+/// What the palette of an object depends on.
 struct ObjectFacts {
     parent: Option<u32>,
     is_building: bool,
@@ -165,12 +165,12 @@ fn unconditional(rules: &[StyleRule]) -> Vec<u16> {
 /// Levels of parts within parts that are looked at, so that objects that are parts of each other end.
 const MAX_DEPTH: usize = 32;
 
-fn look_of(objects: &[ObjectFacts], number: usize, rules: &[StyleRule]) -> Look {
+fn palette_of(objects: &[ObjectFacts], number: usize, rules: &[StyleRule]) -> Palette {
     let parent = |o: &&ObjectFacts| o.parent.and_then(|p| objects.get(p as usize));
     let line: Vec<&ObjectFacts> = std::iter::successors(objects.get(number), parent).take(MAX_DEPTH).collect();
     let is_building = line.iter().any(|o| o.is_building);
     let holds = |k: usize| (0..=rules[k].attributes.len()).all(|c| line.iter().any(|o| o.met[k][c]));
-    Look {
+    Palette {
         tone: if is_building { line.last().map_or(0, |o| (o.hash % TONES as u64) as u8) } else { 0 },
         is_building,
         rules: (0..rules.len()).filter(|k| holds(*k)).map(|k| k as u16).collect(),
@@ -186,9 +186,9 @@ mod tests {
         Object { name: name.into(), class: class.into(), parent, lod: None, attributes }
     }
 
-    fn looks(objects: &[Object], rules: &[StyleRule]) -> Looks {
+    fn surface_colors(objects: &[Object], rules: &[StyleRule]) -> SurfaceColors {
         let facts: Vec<_> = objects.iter().enumerate().map(|(k, o)| ObjectFacts::new(o, k, rules)).collect();
-        Looks::of_objects(&facts, rules)
+        SurfaceColors::of_objects(&facts, rules)
     }
 
     fn rule(color: u8) -> StyleRule {
@@ -211,21 +211,21 @@ mod tests {
             object("c", "building", None, &[("storeys", 3.into())]),
             object("d", "bridge", None, &[("storeys", 3.into())]),
         ];
-        let looks = looks(&objects, &rules);
-        let red = |object: u32, class| looks.color(looks.of(Some(object)), class, &rules)[0];
+        let colors = surface_colors(&objects, &rules);
+        let red = |object: u32, class| colors.color(colors.of(Some(object)), class, &rules)[0];
         assert_eq!([red(0, SurfaceClass::Roof), red(0, SurfaceClass::Wall)], [1, 2]);
         assert_eq!([red(1, SurfaceClass::Roof), red(1, SurfaceClass::Wall)], [1, 2], "a part is its building's");
         assert_eq!(red(2, SurfaceClass::Wall), 3, "a number is compared by its digits");
         assert_eq!(red(3, SurfaceClass::Other), 204, "class and attribute must both hold");
-        assert_eq!(looks.color(looks.of(None), SurfaceClass::Road, &rules), [4, 4, 4, 255], "prototypes too");
+        assert_eq!(colors.color(colors.of(None), SurfaceClass::Road, &rules), [4, 4, 4, 255], "prototypes too");
     }
 
     #[test]
     fn a_part_has_the_tone_of_its_building_and_buildings_differ() {
         let mut objects: Vec<_> = (0..40).map(|k| object(&format!("house {k}"), "building", None, &[])).collect();
         objects.push(object("part", "building_part", Some(7), &[]));
-        let looks = looks(&objects, &[]);
-        let wall = |object: u32| looks.color(looks.of(Some(object)), SurfaceClass::Wall, &[]);
+        let colors = surface_colors(&objects, &[]);
+        let wall = |object: u32| colors.color(colors.of(Some(object)), SurfaceClass::Wall, &[]);
         assert_eq!(wall(40), wall(7));
         let tones: std::collections::BTreeSet<_> = (0..40).map(wall).collect();
         assert_eq!(tones.len(), TONES);
@@ -233,11 +233,11 @@ mod tests {
 
     #[test]
     fn a_building_without_named_surfaces_has_roofs_and_walls() {
-        let looks = looks(&[object("a", "building", None, &[]), object("b", "bridge", None, &[])], &[]);
-        let class = |object, up| looks.class(looks.of(Some(object)), SurfaceClass::Other, || up);
+        let colors = surface_colors(&[object("a", "building", None, &[]), object("b", "bridge", None, &[])], &[]);
+        let class = |object, up| colors.class(colors.of(Some(object)), SurfaceClass::Other, || up);
         assert_eq!([class(0, 0.8), class(0, 0.0), class(0, -1.0)], [SurfaceClass::Roof, SurfaceClass::Wall, SurfaceClass::Wall]);
         assert_eq!(class(1, 0.8), SurfaceClass::Other);
-        assert_eq!(looks.class(looks.of(Some(0)), SurfaceClass::Wall, || 0.8), SurfaceClass::Wall, "what the source says stays");
+        assert_eq!(colors.class(colors.of(Some(0)), SurfaceClass::Wall, || 0.8), SurfaceClass::Wall, "what the source says stays");
     }
 
     #[test]
@@ -253,16 +253,16 @@ mod tests {
                 ObjectFacts::new(&object("a", "bridge", None, &attributes), number, &rules)
             })
             .collect();
-        let looks = Looks::of_objects(&facts, &rules);
-        assert_eq!(looks.len(), facts.len());
+        let colors = SurfaceColors::of_objects(&facts, &rules);
+        assert_eq!(colors.len(), facts.len());
         for number in 1..facts.len() as u32 {
-            assert_eq!(looks.color(looks.of(Some(number)), SurfaceClass::Wall, &rules)[0], number.trailing_zeros() as u8, "{number}");
+            assert_eq!(colors.color(colors.of(Some(number)), SurfaceClass::Wall, &rules)[0], number.trailing_zeros() as u8, "{number}");
         }
     }
 
     #[test]
     fn objects_that_are_parts_of_each_other_end() {
         let objects = [object("a", "building", Some(1), &[]), object("b", "building", Some(0), &[]), object("c", "building", Some(99), &[])];
-        assert_eq!(looks(&objects, &[]).by_object.len(), 3);
+        assert_eq!(surface_colors(&objects, &[]).by_object.len(), 3);
     }
 }
