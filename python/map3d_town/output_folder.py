@@ -16,7 +16,7 @@ from map3d_town.layout.town_plan import TownPlan
 from map3d_town.town_errors import TownError
 from map3d_town.town_spec import TownSpec
 
-VERSION = 2
+VERSION = 3
 JOURNAL = ".town.journal"
 PART = ".part"
 

@@ -30,3 +30,11 @@ def test_each_kind_is_closed_and_fits_an_atlas(style: str) -> None:
                 edges.update((tuple(a), tuple(b)) for a, b in zip(ring, ring[1:] + ring[:1], strict=True))
             assert set(edges.values()) == {1}, kind
             assert all((b, a) in edges for a, b in edges), kind
+
+
+@pytest.mark.parametrize("buildings", [60, 600])
+def test_each_address_stands_once(buildings: int) -> None:
+    plan, _ = plan_town(TownSpec(buildings=buildings, seed=3))
+    addresses = [(building.street, building.house_number) for building in plan.buildings if building.street]
+    assert len(addresses) > buildings / 2
+    assert len(set(addresses)) == len(addresses)

@@ -22,7 +22,8 @@ from map3d_town.layout.plan_builder import PlanBuilder
 from map3d_town.layout.town_plan import BuildingPart
 from map3d_town.polygons_2d import Points, area, contains, keeps_its_edges, left_normal, offset, rectangle, split, unit
 
-RESIDENTIAL, COMMERCIAL, INDUSTRIAL, GARAGE = "1000", "1150", "1110", "1610"
+RESIDENTIAL, COMMERCIAL, INDUSTRIAL, GARAGE = "31001_1010", "31001_2010", "31001_2110", "31001_2463"
+"""Functions of the German cadastre (AdV), whose labels map3d knows."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from map3d_town.layout.plan_builder import PlanBuilder
 from map3d_town.layout.town_plan import BuildingPart
 from map3d_town.polygons_2d import Points, area, circle, keeps_its_edges, left_normal, offset, rectangle, unit
 
-CHURCH, TOWN_HALL, MONUMENT = "1080", "1130", "1820"
+CHURCH, TOWN_HALL, MONUMENT = "31001_3041", "31001_3012", ""
 
 
 def add_market_square(builder: PlanBuilder, outline: Points, rng: np.random.Generator) -> None:

@@ -20,6 +20,7 @@ class PlanBuilder:
     def __init__(self, wanted: int) -> None:
         self.plan = TownPlan()
         self.wanted = wanted
+        self._addresses: set[tuple[str, int]] = set()
 
     @property
     def is_full(self) -> bool:
@@ -28,9 +29,13 @@ class PlanBuilder:
     def add_building(
         self, kind: str, function: str, parts: Iterable[BuildingPart], street: str = "", number: int = 0, installations: PlannedInstallations = ()
     ) -> bool:
-        """Adds a building and its roofs in the orthophoto. Returns False when the town is full."""
+        """Adds a building and its roofs in the orthophoto. An address that is taken becomes the next free one on the same side of the street.
+        Returns False when the town is full."""
         if self.is_full:
             return False
+        while street and (street, number) in self._addresses:
+            number += 2
+        self._addresses.add((street, number))
         building = BuildingPlan(len(self.plan.buildings), kind, function, tuple(parts), street, number, installations)
         self.plan.buildings.append(building)
         for part in building.parts:

@@ -10,7 +10,7 @@ from map3d_town.layout.plan_builder import PlanBuilder
 from map3d_town.polygons_2d import Points, left_normal, offset, unit
 
 PlannedInstallations = tuple[tuple[str, tuple[float, ...]], ...]
-HOUSE, SHOP = "1000", "1150"
+HOUSE, SHOP = "31001_1010", "31001_2050"
 SHOPS_DEEP_M = 5.0
 
 

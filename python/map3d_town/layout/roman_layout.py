@@ -140,12 +140,12 @@ class RomanLayout:
         inward = np.array([-along[1], along[0]])
         spots = [a + along * s + inward * 0.3 for s in np.arange(1.2, np.hypot(*(b - a)) - 1, 2.2)]
         merlons = tuple(("merlon", (float(p[0]), float(p[1]), 0.42, 7.2, 8.3)) for p in spots)
-        self.builder.add_building("wall", "1820", [made], installations=merlons)
+        self.builder.add_building("wall", "", [made], installations=merlons)
 
     def _add_tower(self, at: Points) -> None:
         outline = circle(self.to_town(at), 4.4, 12)
         part = replace(part_without_outline(11.0, 3, "wall", "roman", 0.4), sides=("street",) * 12)
-        self.builder.add_building("tower", "1820", [spire_part(outline, ((0.0, 0.0), (1.0, 3.4)), part)])
+        self.builder.add_building("tower", "", [spire_part(outline, ((0.0, 0.0), (1.0, 3.4)), part)])
 
     def _add_gate(self, at: Points, along: Points) -> None:
         """Adds two round towers and a house over the open passage between them."""
@@ -160,7 +160,7 @@ class RomanLayout:
         house = rectangle(middle + inward * 1.5, ahead, 9.5, 5.0)
         over = replace(part_without_outline(10.2, 3, "wall", "roman", 0.4), lift_m=5.0)
         parts.append(row_part(house[0], house[1], 5.0, ((0.0, 0.0), (0.5, 1.4), (1.0, 0.0)), over, ("street", "street", "blank", "blank")))
-        self.builder.add_building("gate", "1820", parts)
+        self.builder.add_building("gate", "", parts)
 
     def _add_surroundings(self) -> None:
         """Adds cypresses and tombs along the roads out of town, and an aqueduct from the north."""
@@ -176,7 +176,7 @@ class RomanLayout:
                 outline = rectangle(spot, self.to_town(along), 4.2, 3.6)
                 part = replace(part_without_outline(3.2, 1, "temple", "roman", 0.2), sides=("blank",) * 4)
                 if self._is_on_map(spot):
-                    self.builder.add_building("tomb", "1820", [spire_part(outline, ((0.0, 0.0), (1.0, 1.1)), part)])
+                    self.builder.add_building("tomb", "", [spire_part(outline, ((0.0, 0.0), (1.0, 1.1)), part)])
         for s in np.arange(self.plan_half[1] + 14, self.plan_half[1] + 150, 30.0):
             if self._is_on_map(self.to_town(np.array([-2.5 * CELL[0], s + 30.0]))):
                 self._add_aqueduct_piece(np.array([-2.5 * CELL[0], s]), np.array([-2.5 * CELL[0], s + 30.0]))
@@ -191,7 +191,7 @@ class RomanLayout:
         inward = np.array([-(b - a)[1], (b - a)[0]]) / np.hypot(*(b - a))
         spots = [a + (b - a) * t + inward for t in (1 / 12, 3 / 12, 5 / 12, 7 / 12, 9 / 12, 11 / 12)]
         piers = tuple(("merlon", (float(p[0]), float(p[1]), 1.25, -0.6, 8.8)) for p in spots)
-        self.builder.add_building("aqueduct", "1820", [made], installations=piers)
+        self.builder.add_building("aqueduct", "", [made], installations=piers)
 
     def _add_fields(self) -> None:
         """Adds fields, meadows and olive groves around the town."""

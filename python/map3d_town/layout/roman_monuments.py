@@ -10,7 +10,7 @@ from map3d_town.layout.roman_houses import place_columns
 from map3d_town.layout.town_plan import BuildingPart
 from map3d_town.polygons_2d import Points, circle, left_normal, offset, rectangle, unit
 
-PUBLIC, SACRED = "1130", "1080"
+PUBLIC, SACRED = "31001_3010", "31001_3040"
 
 
 def podium_part(outline: Points, height_m: float, facade_kind: str, cover: str) -> BuildingPart:
@@ -71,7 +71,7 @@ def add_forum(builder: PlanBuilder, outline: Points, along: Points, rng: np.rand
             spot = middle + along * t + across * side
             base = rectangle(spot, along, 1.8, 1.8)
             statue = ("column", (float(spot[0]), float(spot[1]), 0.32, 1.6, 4.0))
-            builder.add_building("monument", "1820", [podium_part(base, 1.6, "temple", "paving")], "Forum", 9, (statue,))
+            builder.add_building("monument", "", [podium_part(base, 1.6, "temple", "paving")], "Forum", 9, (statue,))
 
 
 def _add_colonnade(builder: PlanBuilder, a: Points, b: Points) -> None:
@@ -139,7 +139,7 @@ def add_theatre(builder: PlanBuilder, outline: Points, facing: Points, rng: np.r
     boards = podium_part(rectangle(middle + facing * 3.9, side, 34.0, 4.0), 1.3, "roman", "paving")
     row = middle + facing * 5.2
     pillars = place_columns([(row - side * 15, row + side * 15)], 3.0, 0.4, 1.3, 11.0)
-    builder.add_building("theatre", "1130", [cavea, house, boards], "Via Sacra", 1, pillars)
+    builder.add_building("theatre", "31001_3032", [cavea, house, boards], "Via Sacra", 1, pillars)
     builder.add_ground(middle + 11.8 * np.concatenate([spokes, [[0, 0]]]), "plaza", "roof")
 
 
@@ -150,7 +150,7 @@ def add_amphitheatre(builder: PlanBuilder, middle: Points, rng: np.random.Genera
     builder.add_ground(middle + (oval - middle) * 1.2, "sand", "block")
     part = part_without_outline(16.0, 3, "arena", "seats", roof_type="1000")
     made = replace(ring_part(oval, 19.0, seating_profile(14, 12.0), part), sides=("street",) * 36 + ("blank",) * 36)
-    if builder.add_building("amphitheatre", "1130", [made], "Via Appia", 1):
+    if builder.add_building("amphitheatre", "31001_3032", [made], "Via Appia", 1):
         builder.add_ground(made.back, "sand", "roof")
 
 
@@ -184,4 +184,4 @@ def add_macellum(builder: PlanBuilder, outline: Points, along: Points, rng: np.r
     tholos = circle(middle, 6.0, 16)
     lid = replace(part_without_outline(6.0, 1, "temple", "roman", 0.4), lift_m=5.2, sides=("blank",) * 16)
     pillars = tuple(("column", (float(x), float(y), 0.32, -0.4, 5.2)) for x, y in circle(middle, 5.4, 12))
-    builder.add_building("macellum", "1150", [_add_shops, spire_part(tholos, ((0.0, 0.0), (1.0, 2.6)), lid)], "Via Sacra", 2, pillars)
+    builder.add_building("macellum", "31001_2053", [_add_shops, spire_part(tholos, ((0.0, 0.0), (1.0, 2.6)), lid)], "Via Sacra", 2, pillars)

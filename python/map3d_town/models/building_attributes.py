@@ -21,7 +21,7 @@ HEATING = ("district heating", "gas", "heat pump", "oil", "wood pellets")
 
 @dataclass(frozen=True)
 class BuildingAttributes:
-    """The attributes of a building. `function`: CityGML code; `generic`: ("string" | "int" | "double", name, value)."""
+    """The attributes of a building. `function`: code of the AdV, empty for none; `generic`: ("string" | "int" | "double", name, value)."""
 
     id: str
     name: str

@@ -254,10 +254,8 @@ def _format_generic(attributes: BuildingAttributes) -> Iterator[str]:
 
 
 def _format_properties(attributes: BuildingAttributes) -> str:
-    return (
-        f"<bldg:class>1000</bldg:class><bldg:function>{attributes.function}</bldg:function><bldg:usage>{attributes.function}</bldg:usage>"
-        f"<bldg:yearOfConstruction>{attributes.year:04d}</bldg:yearOfConstruction>"
-    )
+    function = f"<bldg:function>{attributes.function}</bldg:function>" if attributes.function else ""
+    return f"{function}<bldg:yearOfConstruction>{attributes.year:04d}</bldg:yearOfConstruction>"
 
 
 def _format_heights(attributes: BuildingAttributes) -> str:
