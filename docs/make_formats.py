@@ -17,6 +17,8 @@ from typing import Any, Final
 
 import rasterio
 
+from map3d.ingest.findings import Finding, findings, sum_findings
+
 TARGET: Final = Path(__file__).with_name("formats.md")
 BEGIN: Final = "<!-- written by docs/make_formats.py -->\n"
 END: Final = "<!-- end of the table -->\n"
@@ -138,15 +140,16 @@ def row(folder: Path) -> str:
 
 
 def _not_drawn(found: Mapping[str, Any], folder: Path) -> Iterator[str]:
-    """Yields what is not drawn: skipped elements by code, objects without geometry, and files by reason."""
-    skipped: Counter[str] = Counter()
+    """Yields what is not drawn: skipped elements by reason, objects without geometry, and files by reason."""
+    skipped: list[Finding] = []
     without: Counter[str] = Counter()
     for file in found["files"]:
-        skipped.update({one["code"]: one["count"] for one in file["findings"] if one["severity"] in ("skipped", "omitted")})
+        skipped += [found for found in findings(file) if found.skipped]
         without.update({kind["kind"].replace("_", " "): kind["count"] - kind["drawn"] for kind in file["kinds"] if kind["count"] > kind["drawn"]})
-    yield from (f"{count:,} × {code}" for code, count in skipped.most_common())
+    yield from (str(found.message).removesuffix(".") for found in sum_findings(skipped))
     yield from (f"{count:,} {kind} without geometry" for kind, count in without.most_common())
-    reasons = Counter(_plain(reason.removeprefix(f"{path}: "), folder, Path(path).name) for path, reason in [*found["failed"], *found["ignored"]])
+    others = [*((path, reason["text"]) for path, reason in found["failed"]), *found["ignored"]]
+    reasons = Counter(_plain(reason.removeprefix(f"{path}: "), folder, Path(path).name) for path, reason in others)
     for reason, count in reasons.most_common(MAX_REASONS):
         yield f"{_count(count, 'file')}: {reason}"
     if len(reasons) > MAX_REASONS:

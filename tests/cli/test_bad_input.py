@@ -90,7 +90,7 @@ def test_truncated_document_is_read_up_to_the_cut(run: Run, tmp_path: Path) -> N
     (tmp_path / "a.gml").write_text(truncated())
     status, out, err = run("add-files", "town", "a.gml", "--crs", "local")
     assert (status, err) == (0, "")
-    assert re.search(r"a: The file breaks off; what comes before is kept\. Example: at byte \d+, line \d+ \(.*\); what comes before is kept\n", out)
+    assert re.search(r"a: The file breaks off; what comes before is kept\. Example: at byte \d+, line \d+ \(.*\)\n", out)
     with Registry(Workspace(tmp_path / "workspace").registry_path("town")) as registry:
         assert {"one", "two"} <= {item.name for item in registry.objects()}
 

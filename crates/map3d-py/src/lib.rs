@@ -32,7 +32,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("LAYERS", serde_json::to_string(&map3d_base::layers::LAYERS).expect("plain values"))?;
     m.add("AO_RADIUS_M", (limits::AO_RADIUS_M[0], limits::AO_RADIUS_M[1]))?;
     m.add("NAME_PATTERN", limits::NAME_PATTERN)?;
-    m.add("MESSAGES", map3d_base::reason::MESSAGES)?;
+    m.add("MESSAGES", include_str!("../../../spec/messages.json"))?;
     m.add("OBJECTS_PER_SHARD", limits::OBJECTS_PER_SHARD)?;
     m.add("HEAD_BYTES", map3d_read::HEAD_BYTES)?;
     m.add("READER_VERSIONS", formats::reader_versions(py)?)?;

@@ -30,7 +30,7 @@ fn broken_polygons_are_skipped_and_counted() {
 fn first_fault_is_an_error_with_strict() {
     let strict = ReadOptions { strict: true, ..ReadOptions::default() };
     let text = building(&at_lod(2, &polygon("p", "0 0 0 1 1 1 0 0 0")));
-    assert!(is_format_error(try_text(&text, &strict), "rings with fewer than 3 points: 1. Example: b1"));
+    assert!(is_format_error(try_text(&text, &strict), "ring with too few points: b1"));
     assert!(try_text(&building(&at_lod(2, &square("p", 1))), &strict).is_ok());
 }
 
@@ -173,7 +173,6 @@ fn complete_polygons_before_the_end_of_a_cut_document_are_read() {
         let warning = document.report.findings.iter().find(|w| w.message.reason.code() == "document-broken").expect("a warning");
         let line = broken[..cut].matches('\n').count() + 1;
         assert!(warning.example.contains(&format!(", line {line} (")) && warning.example.contains(what), "{}", warning.example);
-        assert!(warning.example.ends_with("; what comes before is kept"), "{}", warning.example);
     }
     let exact = read_text(&text[..cut]).report.findings[0].example.clone();
     assert!(exact.starts_with(&format!("at byte {cut}, line")), "{exact}");

@@ -79,7 +79,7 @@ impl ReportBuilder {
     fn add(&mut self, message: Message, severity: Severity, count: u64, example: impl FnOnce() -> String) -> Result<()> {
         debug_assert_eq!(message.reason.severity(), severity, "{}", message.reason.code());
         if count > 0 && self.strict && matches!(severity, Severity::Warning | Severity::Skipped) {
-            return Err(Error::format(&self.path, format!("{message} Example: {}", example())));
+            return Err(Error::format(&self.path, format!("{message}: {}", example())));
         }
         self.report.add(message, count, example);
         Ok(())

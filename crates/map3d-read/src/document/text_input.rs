@@ -136,7 +136,7 @@ fn find_utf8_fault(file: &mut ByteSource) -> io::Result<Option<EncodingFault>> {
     let fault = loop {
         let n = match file.read(&mut buffer[kept..]) {
             Err(_) if file.is_gzip() => {
-                let example = format!("after {} unpacked bytes; what comes before is kept", file.end_at_damage());
+                let example = format!("after {} unpacked bytes", file.end_at_damage());
                 break Some(EncodingFault { reason: Reason::GzipDamaged, example });
             }
             read => read?,

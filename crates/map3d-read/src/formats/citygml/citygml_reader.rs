@@ -155,7 +155,7 @@ impl CityGmlReader {
     fn report_malformed(&mut self) {
         let Some(Malformed { byte, what }) = self.xml.malformed().cloned() else { return };
         let line = count_lines(self.report.path(), byte).map_or_else(|_| String::new(), |line| format!(", line {line}"));
-        self.report.note(Reason::DocumentBroken, format!("at byte {byte}{line} ({what}); what comes before is kept"));
+        self.report.note(Reason::DocumentBroken, format!("at byte {byte}{line} ({what})"));
     }
 
     /// Reads the geometry that is in other documents of the folder.
