@@ -3,11 +3,20 @@
 The command line exits with `exit_code`: 2 for an invalid request, 1 for a task that failed.
 """
 
+from map3d.messages import Message
+
 
 class Map3dError(Exception):
-    """The base class of all errors that map3d raises deliberately; the text is one line for the user."""
+    """The base class of all errors that map3d raises deliberately. It is made of a message, or of one line of text for the user."""
 
     exit_code = 1
+    code = "verbatim"
+    """The code of a text."""
+
+    @property
+    def message(self) -> Message:
+        first = self.args[0] if self.args else ""
+        return first if isinstance(first, Message) else Message(self.code, {"text": str(first)})
 
 
 class BadRequest(Map3dError):
@@ -42,6 +51,8 @@ class UnknownFormat(BadRequest):
 
 class CrsError(BadRequest):
     """The coordinate system is unknown, missing, or incompatible with the scene's."""
+
+    code = "crs-unusable"
 
 
 class ImportFailed(Map3dError):

@@ -4,7 +4,7 @@ Nothing compares the text of a message: programs and pages look at the code.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from string import Formatter
@@ -27,7 +27,7 @@ class Message:
         return self.text("en")
 
     def text(self, language: str) -> str:
-        """Returns the text in "en", "de" or "fr". A message of another version of map3d, whose text or values are not known, is shown as data."""
+        """Returns the text in a language of `number_formats.STYLES`. A message with unknown text or values, of another version, is shown as data."""
         try:
             text = table()[self.code][language]
             chosen = text if isinstance(text, str) else text[0 if self.values["count"] == 1 else 1]
@@ -44,6 +44,19 @@ class Message:
         """The message as JSON."""
         return {"code": self.code, "values": {name: _plain(value) for name, value in self.values.items()}}
 
+    @property
+    def codes(self) -> set[str]:
+        """Its code and those of the messages in it."""
+        return {self.code, *(code for part in _parts(self.values) for code in part.codes)}
+
+    def map_texts(self, change: Callable[[str], str]) -> "Message":
+        """Returns the message with another text in place of each text among its values."""
+        return Message(self.code, _map_texts(self.values, change))
+
+    def named(self, name: str) -> dict[str, Any]:
+        """Returns the English text as the member NAME of a JSON object, with NAME_code and NAME_values."""
+        return {name: str(self), **{f"{name}_{part}": value for part, value in self.document.items()}}
+
 
 def message(code: str, **values: Any) -> Message:
     """Returns a new message. Raises KeyError for a code that spec/messages.json does not have."""
@@ -57,8 +70,24 @@ def verbatim(text: str) -> Message:
 
 
 def load_message(document: Any) -> Message:
-    """Returns a message from JSON; what an older version of map3d stored is a text."""
+    """Returns a message from JSON; what has no code is a text."""
     return _loaded(document) if isinstance(document, dict) else verbatim(str(document))
+
+
+def dump_text(message: Message | None) -> str:
+    """Returns the JSON that catalogues store as text, empty for None."""
+    return "" if message is None else json.dumps(message.document, ensure_ascii=False)
+
+
+def load_text(text: str | None) -> Message | None:
+    """Reverses `dump_text`. What an older version of map3d stored is a text."""
+    if not text:
+        return None
+    try:
+        document = json.loads(text)
+    except ValueError:
+        return verbatim(text)
+    return _loaded(document) if isinstance(document, dict) and set(document) == {"code", "values"} else verbatim(text)
 
 
 @cache
@@ -86,6 +115,24 @@ class _Text(Formatter):
         if isinstance(value, Message):
             return value.text(self._language)
         return number_formats.number(value, self._language) if isinstance(value, int | float) else str(value)
+
+
+def _parts(value: Any) -> Iterator[Message]:
+    if isinstance(value, Message):
+        yield value
+    elif isinstance(value, Mapping | list | tuple):
+        for item in value.values() if isinstance(value, Mapping) else value:
+            yield from _parts(item)
+
+
+def _map_texts(value: Any, change: Callable[[str], str]) -> Any:
+    if isinstance(value, Message):
+        return value.map_texts(change)
+    if isinstance(value, Mapping):
+        return {name: _map_texts(item, change) for name, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_map_texts(item, change) for item in value]
+    return change(value) if isinstance(value, str) else value
 
 
 def _plain(value: Any) -> Any:

@@ -12,6 +12,7 @@ from map3d.catalogue.sqlite import SqliteCatalogue
 from map3d.catalogue.sqlite_jobs import _LEASE
 from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, TRANSITIONS, JobEvent
 from map3d.errors import StaleFence
+from map3d.messages import message, verbatim
 from map3d.types import BlockId
 from tests.catalogue.implementations import LEASE_S
 
@@ -82,9 +83,9 @@ def test_quarantined_block_keeps_its_reduce_job_waiting(catalogue: Catalogue) ->
     for attempt in range(1, MAX_ATTEMPTS + 1):
         lease = take(catalogue)
         assert lease.attempt == attempt
-        state = catalogue.fail(lease, f"bad {attempt}")
+        state = catalogue.fail(lease, verbatim(f"bad {attempt}"))
     assert state is State.QUARANTINED
-    assert only(catalogue).reason == "bad 3"
+    assert only(catalogue).reason == verbatim("bad 3")
     assert catalogue.lease("town-a", "w") is None
     counts = catalogue.count_jobs("town-a")
     assert (counts[State.WAITING], counts[State.QUARANTINED]) == (1, 1)
@@ -129,7 +130,7 @@ def test_lease_starts_at_a_hilbert_index_and_wraps_around(catalogue: Catalogue) 
         catalogue.release(lease)
     again = catalogue.lease("town-a", "w", third)
     assert again is not None
-    catalogue.fail(again, "bad")
+    catalogue.fail(again, verbatim("bad"))
     after = [catalogue.lease("town-a", "w", third) for _ in range(4)]
     assert [lease.block.x for lease in after if lease is not None] == [3, 0, 1, 2], "what failed comes last"
 
@@ -137,7 +138,7 @@ def test_lease_starts_at_a_hilbert_index_and_wraps_around(catalogue: Catalogue) 
 def test_retry_allows_a_quarantined_job_three_more_attempts(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base(0), base(1)])
     while (lease := catalogue.lease("town-a", "w")) is not None:
-        catalogue.fail(lease, "bad")
+        catalogue.fail(lease, verbatim("bad"))
     assert catalogue.retry("town-a", [("0-45", BlockId(3, 1, 0))]) == 1
     assert take(catalogue).attempt == 1
     assert catalogue.retry("town-a") == 1
@@ -146,7 +147,7 @@ def test_retry_allows_a_quarantined_job_three_more_attempts(catalogue: Catalogue
 
 def test_failed_jobs_go_to_the_end_of_the_queue(catalogue: Catalogue) -> None:
     catalogue.plan("town-a", [base(0), base(1)])
-    catalogue.fail(take(catalogue), "bad")
+    catalogue.fail(take(catalogue), verbatim("bad"))
     assert take(catalogue).block.x == 1
     assert take(catalogue).block.x == 0
 
@@ -209,7 +210,7 @@ def test_tenth_expired_lease_quarantines_the_job(catalogue: Catalogue) -> None:
         take(catalogue)
         assert catalogue.expire("town-a", ["w"]) == 1
     assert catalogue.lease("town-a", "w") is None
-    assert "lease expired 10 times" in (only(catalogue, State.QUARANTINED).reason or "")
+    assert only(catalogue, State.QUARANTINED).reason == message("lease-expired", count=10, worker="w")
     assert catalogue.retry("town-a") == 1
     assert (take(catalogue).attempt, only(catalogue).expiries) == (1, 0)
 
@@ -219,7 +220,7 @@ def test_expired_leases_do_not_add_to_failed_attempts(catalogue: Catalogue) -> N
     for attempt in range(1, MAX_ATTEMPTS + 1):
         take(catalogue)
         catalogue.expire("town-a", ["w"])
-        state = catalogue.fail(take(catalogue), f"bad {attempt}")
+        state = catalogue.fail(take(catalogue), verbatim(f"bad {attempt}"))
     assert state is State.QUARANTINED
     assert (only(catalogue).attempts, only(catalogue).expiries) == (MAX_ATTEMPTS, MAX_ATTEMPTS)
 
@@ -318,7 +319,7 @@ def accepted(catalogue: Catalogue, x: int, state: State, word: str) -> bool:
     elif state is State.DONE:
         catalogue.done(lease, RESULT)
     elif state is State.QUARANTINED:
-        while catalogue.fail(lease, "bad") is not State.QUARANTINED:
+        while catalogue.fail(lease, verbatim("bad")) is not State.QUARANTINED:
             lease = take(catalogue)
     try:
         say(catalogue, word, lease)
@@ -334,7 +335,7 @@ def say(catalogue: Catalogue, word: str, lease: Lease) -> None:
     if word == "done":
         catalogue.done(lease, RESULT)
     elif word == "fail":
-        catalogue.fail(lease, "bad")
+        catalogue.fail(lease, verbatim("bad"))
     elif word == "release":
         catalogue.release(lease)
     else:

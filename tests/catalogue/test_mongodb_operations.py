@@ -14,6 +14,7 @@ import pytest
 from map3d.catalogue import Catalogue, OperationLease, OperationState, SceneRecord, open_catalogue
 from map3d.catalogue.mongodb_connection import MongoConnection
 from map3d.errors import BadRequest, StaleFence
+from map3d.messages import verbatim
 from tests.catalogue.implementations import Kill, NewUrl, new_urls
 
 LEASE_S = 0.3
@@ -24,11 +25,11 @@ def _leased(catalogue: Catalogue, lease: OperationLease) -> None:
 
 
 def _logged(catalogue: Catalogue, lease: OperationLease) -> None:
-    catalogue.append_log(lease, ["a", "b"])
+    catalogue.append_log(lease, [verbatim("a"), verbatim("b")])
 
 
 def _progressed(catalogue: Catalogue, lease: OperationLease) -> None:
-    catalogue.heartbeat_operation(lease, "building", 1, 2)
+    catalogue.heartbeat_operation(lease, verbatim("building"), 1, 2)
 
 
 def _ended(catalogue: Catalogue, lease: OperationLease) -> None:
@@ -73,7 +74,7 @@ def test_change_killed_before_or_after_any_request_can_be_repeated(
         expected = OperationState.CANCELLED if change is _cancelled else OperationState.DONE
         states = [item.state for item in catalogue.operations()]
         assert states == [OperationState.DONE, expected], f"killed at request {number}"
-        assert [line.text for line in catalogue.operation_log(lease.operation.id)][-2:] in ([], ["a", "b"])
+        assert [str(line.text) for line in catalogue.operation_log(lease.operation.id)][-2:] in ([], ["a", "b"])
         catalogue.close()
         number += 1
     assert number > 2, "there were requests to kill"
@@ -112,13 +113,14 @@ def work_off(catalogue: Catalogue) -> None:
 TAKE_ALL = """
 import json, sys, time
 from map3d.catalogue import OperationState, open_catalogue
+from map3d.messages import verbatim
 
 catalogue = open_catalogue(sys.argv[1])
 spans = []
 while catalogue.operations(states=["waiting"], limit=1):
     if (lease := catalogue.lease_operation(sys.argv[2])) is not None:
         began = time.monotonic_ns()
-        assert catalogue.heartbeat_operation(lease, "s", 0, 1)
+        assert catalogue.heartbeat_operation(lease, verbatim("s"), 0, 1)
         ended = time.monotonic_ns()
         catalogue.end_operation(lease, OperationState.DONE)
         spans.append([lease.operation.scene, lease.operation.id, began, ended])

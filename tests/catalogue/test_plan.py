@@ -8,6 +8,7 @@ import pytest
 
 from map3d.catalogue import Catalogue, PlanCounts, PlannedJob, State, mongodb_jobs, mongodb_plan, sqlite_jobs
 from map3d.errors import NotFound, StaleFence
+from map3d.messages import verbatim
 from map3d.types import BlockId
 from tests.catalogue.pyramids import RESULT, TRACKS, described, is_bottom_up, pyramid, states, stop_after, take, work_off
 
@@ -198,7 +199,7 @@ def test_counts_agree_with_the_jobs_after_every_change(catalogue: Catalogue) -> 
     check()
     catalogue.plan("town-a", pyramid())
     check()
-    for call in (lambda lease: catalogue.done(lease, RESULT), lambda lease: catalogue.fail(lease, "bad"), catalogue.release):
+    for call in (lambda lease: catalogue.done(lease, RESULT), lambda lease: catalogue.fail(lease, verbatim("bad")), catalogue.release):
         call(take(catalogue))
         check()
     take(catalogue, "gone")

@@ -4,6 +4,7 @@ import pytest
 
 from map3d.catalogue import Catalogue, State
 from map3d.errors import NotFound, StaleFence
+from map3d.messages import verbatim
 from map3d.types import BlockId
 from tests.catalogue.pyramids import RESULT, TRACKS, is_bottom_up, pyramid, states, take, work_off
 
@@ -62,7 +63,7 @@ def test_rendering_has_open_jobs_until_the_last_is_done(planned: Catalogue) -> N
 
 def test_waiting_and_quarantined_jobs_are_not_open(planned: Catalogue) -> None:
     while (lease := planned.lease("town-a", "w")) is not None:
-        planned.fail(lease, "bad")
+        planned.fail(lease, verbatim("bad"))
     assert not planned.has_open_jobs("town-a")
     assert not planned.has_open_jobs("nowhere")
 
@@ -145,7 +146,7 @@ def test_reopening_makes_the_lease_above_stale(planned: Catalogue) -> None:
 
 def test_retry_leaves_a_reduce_job_waiting_above_open_jobs(planned: Catalogue) -> None:
     while (lease := planned.lease("town-a", "w")) is not None:
-        planned.done(lease, RESULT) if lease.kind == "base" else planned.fail(lease, "bad")
+        planned.done(lease, RESULT) if lease.kind == "base" else planned.fail(lease, verbatim("bad"))
     assert states(planned, State.QUARANTINED) == [FIRST, SECOND]
     planned.reopen("town-a", [(TRACK, BASE[0])])
     assert planned.retry("town-a") == 2

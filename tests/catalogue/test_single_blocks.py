@@ -9,6 +9,7 @@ import pytest
 from map3d.catalogue import Catalogue, State
 from map3d.catalogue.states import MAX_ATTEMPTS
 from map3d.errors import StaleFence
+from map3d.messages import verbatim
 from map3d.types import BlockId
 from tests.catalogue.implementations import LEASE_S
 from tests.catalogue.pyramids import RESULT, TRACKS, pyramid, take, work_off
@@ -96,7 +97,7 @@ def test_eviction_does_not_use_up_attempts(planned: Catalogue) -> None:
         planned.release(lease)
     again = planned.lease_block("town-a", "w", TRACK, BASE[0])
     assert again is not None
-    assert (again.attempt, planned.fail(again, "once")) == (1, State.TODO)
+    assert (again.attempt, planned.fail(again, verbatim("once"))) == (1, State.TODO)
 
 
 def test_an_eviction_that_was_killed_leaves_the_block_open(brief_catalogue: Catalogue) -> None:

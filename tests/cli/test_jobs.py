@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import State, Workspace
+from map3d.messages import verbatim
 from map3d.tiles.naming import block_levels
 from tests.cli.test_verify_pixels import swap_two_images
 from tests.cli.test_whole import digest
@@ -124,7 +125,7 @@ def test_jobs_shows_leases_with_host_and_time(run: Run, rendered: Workspace) -> 
     (held,) = json.loads(run("jobs", "view", "--json")[1])["leases"]
     assert (held["host"], held["block"], held["attempt"], 0 <= held["seconds"] < 60) == ("node-7", list(lease.block), 1, True)
     assert "node-7" in run("jobs", "view")[1]
-    catalogue.fail(lease, "the sky fell")
+    catalogue.fail(lease, verbatim("the sky fell"))
     assert "the sky fell" in run("jobs", "view")[1]
     catalogue.close()
 

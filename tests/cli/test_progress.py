@@ -10,6 +10,7 @@ from map3d.cli import progress
 from map3d.cli.progress import LoggedProgress, line, show_stage
 from map3d.cli.run_progress import RunProgress
 from map3d.jobs.events import JobDone, JobFailed, Planned, Remaining, SceneChanged
+from map3d.messages import verbatim
 from map3d.types import BlockId
 
 
@@ -67,7 +68,7 @@ def test_bar_of_a_run_counts_again_after_a_new_plan_and_follows_other_runs(monke
         assert run.counted == (0, 25)
         run(Remaining(30))
         assert run.counted == (0, 30), "another run has planned more"
-        run(JobFailed(lease, "it fell", State.TODO))
+        run(JobFailed(lease, verbatim("it fell"), State.TODO))
     lines = shown.getvalue()
     assert "blocks: 2 new, 3 changed, 5 unchanged; 25 to render" in lines
     assert "files changed during the render" in lines

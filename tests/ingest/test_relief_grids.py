@@ -171,12 +171,12 @@ def test_rasters_that_do_not_fit_are_named(tmp_path: Path) -> None:
 
     write_raster(tmp_path / "size" / "dem.tif")
     done, _ = add(tmp_path / "size", [write_model(tmp_path / "size" / "town.gml", columns=9)])
-    assert [reason.partition("dem.tif: ")[2] for _, reason in done.failed] == ["6 × 5 pixels, but the grid of its RasterRelief has 9 × 5 points"]
+    assert [str(reason).partition("dem.tif: ")[2] for _, reason in done.failed] == ["6 × 5 pixels, but the grid of its RasterRelief has 9 × 5 points"]
 
     (tmp_path / "words").mkdir()
     (tmp_path / "words" / "dem.tif").write_text("no raster")
     done, _ = add(tmp_path / "words", [write_model(tmp_path / "words" / "town.gml")])
-    assert [(Path(file).name, "a file of unknown format" in reason) for file, reason in done.failed] == [("dem.tif", True)]
+    assert [(Path(file).name, "a file of unknown format" in str(reason)) for file, reason in done.failed] == [("dem.tif", True)]
 
 
 def test_a_site_names_an_image_that_is_no_raster(tmp_path: Path) -> None:

@@ -104,7 +104,7 @@ def test_a_folder_without_a_readable_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UnknownFormat, match="no readable file in this folder;"):
         find_sources([tmp_path])
     (tmp_path / "town.zip").write_bytes(b"PK\x03\x04")
-    with pytest.raises(UnknownFormat, match=r"no readable file in this folder \(found .*town.zip: a ZIP archive\);"):
+    with pytest.raises(UnknownFormat, match=r"no readable file in this folder \(found .*town.zip: a ZIP archive; unpack it first\);"):
         find_sources([tmp_path])
 
 

@@ -198,7 +198,7 @@ def test_cluster_that_cannot_work_ends_the_run_with_the_reason(workspace: Worksp
     assert not result.complete
     assert result.open_jobs == len(list(catalogue.jobs("r")))
     (reason,) = [event.reason for event in events if isinstance(event, WorkerExited)]
-    assert "cannot start" in reason
+    assert "cannot start" in str(reason)
     assert all(job.attempts == 0 for job in catalogue.jobs("r"))
 
 

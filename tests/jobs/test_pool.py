@@ -117,7 +117,7 @@ def test_run_does_every_job_once(town: Town) -> None:
     assert all_done(town)
     leases = [event.lease for event in events if isinstance(event, JobDone)]
     assert len({(lease.track, lease.block) for lease in leases}) == len(leases) == statistics.done > JOBS
-    assert all(event.reason == "" for event in events if isinstance(event, WorkerExited))
+    assert all(event.reason is None for event in events if isinstance(event, WorkerExited))
     assert statistics.failed_attempts == statistics.lost_leases == 0
     assert 0 < statistics.empty < statistics.done
 
@@ -204,7 +204,7 @@ def test_reason_says_how_the_subprocess_ended(town: Town, faults: Path) -> None:
     for x, kind in enumerate(words):
         (faults / f"{z}-{x}-0").write_text(kind)
     town.run()
-    reasons = {job.block.x: job.reason or "" for job in town.catalogue.jobs("town-a", state=State.QUARANTINED)}
+    reasons = {job.block.x: str(job.reason) for job in town.catalogue.jobs("town-a", state=State.QUARANTINED)}
     assert all(word in reasons[x] for x, word in enumerate(words.values())), list(reasons.values())
 
 

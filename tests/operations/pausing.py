@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from map3d.lifecycle import remove_rendering, remove_scene
+from map3d.messages import Message
 from map3d.operations import do_operation
 from map3d.operations.operation_report import OperationReport
 from map3d.subprocess import Handler
@@ -21,9 +22,9 @@ def open_pausing(setup: dict[str, Any]) -> Handler:
     stage, _, done = os.environ["MAP3D_TEST_POINT"].partition("@")
     progress = OperationReport.progress
 
-    def pausing_progress(self: OperationReport, name: str, now: int = 0, total: int = 0) -> None:
-        progress(self, name, now, total)
-        if name.startswith(stage) and now >= int(done or 0):
+    def pausing_progress(self: OperationReport, stage_now: Message, now: int = 0, total: int = 0) -> None:
+        progress(self, stage_now, now, total)
+        if str(stage_now).startswith(stage) and now >= int(done or 0):
             self.flush()
             reach()
 

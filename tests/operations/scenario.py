@@ -87,7 +87,7 @@ class Scenario:
         create_rendering(self.workspace, self.catalogue, request)
 
     def log(self, operation: OperationRecord) -> str:
-        return "\n".join(line.text for line in self.catalogue.operation_log(operation.id))
+        return "\n".join(str(line.text) for line in self.catalogue.operation_log(operation.id))
 
 
 def open_scenario(folder: Path, catalogue_url: str | None = None) -> Scenario:

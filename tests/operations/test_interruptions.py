@@ -12,6 +12,7 @@ import pytest
 
 from map3d.catalogue import OperationRecord, OperationState, State
 from map3d.errors import StoreError
+from map3d.messages import message
 from tests.cli.towns import write_town
 from tests.operations.scenario import (
     Scenario,
@@ -80,8 +81,8 @@ def test_cancelled_operation_stops_and_a_retry_resumes(
         assert scenario.catalogue.cancel_operation(operation.id).cancelling
         wait_for(lambda: scenario.catalogue.operation(operation.id).state is OperationState.CANCELLED, "the end of the operation")
         assert not is_running(int(reached.read_text()))
-        message = scenario.catalogue.operation(operation.id).message
-        assert message.startswith(f"cancelled while {point.partition('@')[0]}")
+        said = str(scenario.catalogue.operation(operation.id).message)
+        assert said.startswith(f"cancelled while {point.partition('@')[0]}")
         if operation.kind == "render":
             assert scenario.catalogue.count_jobs("town")[State.LEASED] == 0
         assert not list((scenario.workspace.root / "uploads").glob(".operation-*"))
@@ -122,7 +123,7 @@ def test_crash_costs_the_operation_alone(scenario: Scenario, archive: Path, reac
     crashing = scenario.ask("import", files=[scenario.upload(archive)])
     worker = pause_at("importing house-2.obj", scenario, reached, monkeypatch)
     wait_for(lambda: scenario.catalogue.operation(crashing.id).state is OperationState.FAILED, "the end of the operation")
-    assert "SIGSEGV" in scenario.catalogue.operation(crashing.id).message
+    assert "SIGSEGV" in str(scenario.catalogue.operation(crashing.id).message)
     assert worker.poll() is None, "the worker continues"
     kill(worker)
     scenario.catalogue.retry_operation(crashing.id)
@@ -146,7 +147,7 @@ def test_progress_and_log_are_seen_while_the_operation_runs(
 ) -> None:
     asked = scenario.ask("import", files=[scenario.upload(archive)])
     worker = pause_at("importing house-2.obj", scenario, reached, monkeypatch)
-    wait_for(lambda: scenario.catalogue.operation(asked.id).stage.startswith("importing house-2.obj"), "the progress")
+    wait_for(lambda: str(scenario.catalogue.operation(asked.id).stage).startswith("importing house-2.obj"), "the progress")
     running = scenario.catalogue.operation(asked.id)
     assert (running.state, running.done, running.total) == (OperationState.RUNNING, 1, 4)
     assert running.worker is not None
@@ -161,7 +162,7 @@ def test_operation_that_waits_behind_one_of_another_worker_is_done(scenario: Sce
     lease = scenario.catalogue.lease_operation("elsewhere.00000000.1.1/0")
     assert lease is not None
     assert lease.operation.id == first.id
-    ending = threading.Timer(1.0, lambda: scenario.catalogue.end_operation(lease, OperationState.DONE, "imported 1 file, 0 unchanged"))
+    ending = threading.Timer(1.0, lambda: scenario.catalogue.end_operation(lease, OperationState.DONE, message("imported", files=1, unchanged=0)))
     ending.start()
     scenario.work()
     ending.join()

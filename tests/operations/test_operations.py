@@ -8,9 +8,11 @@ from pymongo import MongoClient
 
 from map3d.catalogue import OperationState
 from map3d.errors import BadRequest, NotFound
+from map3d.messages import message, table
 from map3d.operations.arguments import ARGUMENTS
 from map3d.operations.do_operation import DO
 from map3d.operations.uploaded_files import IMPORT_FOLDERS, check_host_path
+from map3d.scenes.build import build
 from tests.cli.towns import write_town
 from tests.operations.scenario import Scenario, open_scenario, published, run_all
 
@@ -30,19 +32,19 @@ def test_zip_with_textures_is_imported_built_rendered_published_and_removed(scen
     assert list(scenario.workspace.asset_folder("town", "textured").glob("textures/*.png")), "the texture was found beside its document"
     assert (scenario.workspace.root / "published" / "town" / "index.html").is_file()
     imported = scenario.catalogue.operations()[-1]
-    assert imported.message == "imported 4 files, 0 unchanged"
+    assert imported.message == message("imported", files=4, unchanged=0)
     assert "house-1: 1 object, 12 triangles" in scenario.log(imported)
     removed = scenario.do("remove", what="files", names=["house-1"])
-    assert (removed.state, removed.message) == (DONE, "removed 1 file from scene town")
+    assert (removed.state, removed.message) == (DONE, message("files-removed", files=1, scene="town"))
     assert len(scenario.catalogue.assets("town")) == 3
     assert scenario.do("render").state is DONE
-    assert scenario.do("publish").message.endswith("removed")
+    assert str(scenario.do("publish").message).endswith("removed")
     with pytest.raises(BadRequest, match=r"rendering town: is published in published/town; list in folders"):
         scenario.ask("remove", what="rendering")
     with pytest.raises(NotFound, match="no published folder other"):
         scenario.ask("remove", what="rendering", folders=["town", "other"])
     removed = scenario.do("remove", what="rendering", folders=["town"])
-    assert (removed.state, removed.message.partition(", ")[0]) == (DONE, "removed rendering town with published/town")
+    assert (removed.state, str(removed.message).partition(", ")[0]) == (DONE, "removed rendering town with published/town")
     assert list((scenario.workspace.root / "published").iterdir()) == []
     assert scenario.do("remove", what="scene").state is DONE
     assert scenario.catalogue.scenes() == []
@@ -74,24 +76,39 @@ def test_broken_file_fails_the_import_after_the_others_are_imported(scenario: Sc
     files[1].write_text("v 0 0 0\nf 1 1 1\n")
     ended = scenario.do("import", files=[scenario.upload(path) for path in files])
     assert ended.state is FAILED
-    assert "imported 1 file, 0 unchanged, 1 failed" in ended.message
+    assert "imported 1 file, 0 unchanged, 1 failed" in str(ended.message)
     assert "bad.obj" in scenario.log(ended)
     assert [asset.name for asset in scenario.catalogue.assets("town")] == ["house-0-0"]
     again = scenario.catalogue.retry_operation(ended.id)
     scenario.work()
-    assert "imported 0 files, 1 unchanged, 1 failed" in scenario.catalogue.operation(again.id).message, "uploads stay until all are imported"
+    assert "imported 0 files, 1 unchanged, 1 failed" in str(scenario.catalogue.operation(again.id).message), "uploads stay until all are imported"
 
 
 def test_damaged_archive_fails_the_import(scenario: Scenario, tmp_path: Path) -> None:
     (tmp_path / "bad.zip").write_bytes(b"PK\x03\x04 no archive")
     ended = scenario.do("import", files=[scenario.upload(tmp_path / "bad.zip")])
-    assert (ended.state, "bad.zip: cannot be unpacked" in ended.message) == (FAILED, True)
+    assert (ended.state, "bad.zip: cannot be unpacked" in str(ended.message)) == (FAILED, True)
 
 
 def test_two_uploads_with_one_name_are_refused(scenario: Scenario, tmp_path: Path) -> None:
     path = next(write_town(tmp_path / "town", 1).iterdir())
     ended = scenario.do("import", files=[scenario.upload(path), scenario.upload(path)])
-    assert (ended.state, "two of the uploaded files have this name" in ended.message) == (FAILED, True)
+    assert (ended.state, ended.message) == (FAILED, message("upload-name-taken", file=path.name))
+
+
+def test_every_count_and_stage_of_a_build_has_a_text(scenario: Scenario, tmp_path: Path) -> None:
+    path = next(write_town(tmp_path / "town", 1).iterdir())
+    scenario.do("import", files=[scenario.upload(path)])
+    stages = set()
+
+    def progress(stage: str, _done: int, _total: int) -> bool:
+        stages.add(stage)
+        return True
+
+    report = build(scenario.workspace, scenario.catalogue, "town", threads=1, max_memory_bytes=1 << 30, progress=progress)
+    counts = {name for name, count in report.items() if isinstance(count, int)}
+    assert (len(counts) > 15, "chunks" in stages) == (True, True)
+    assert {*(f"built-{name.replace('_', '-')}" for name in counts), *(f"building-{stage}" for stage in stages)} <= set(table())
 
 
 def test_asset_gets_the_given_name(scenario: Scenario, tmp_path: Path) -> None:

@@ -319,6 +319,6 @@ def test_progress_counts_every_tile(workspace, out):
     seen = []
     publish(workspace, "tea", out, progress=lambda *step: seen.append(step) or True)
     total = len(every_tile()) * 8
-    tiles = [step for step in seen if step[0] == "publish"]
+    tiles = [step for step in seen if step[0] == "tiles"]
     assert [step[1] for step in tiles] == sorted(step[1] for step in tiles)
-    assert tiles[-1] == ("publish", total, total)
+    assert tiles[-1] == ("tiles", total, total)

@@ -11,6 +11,7 @@ from openapi_spec_validator import validate
 
 from map3d.catalogue import OperationState, PlannedJob, Workspace
 from map3d.catalogue.states import MAX_ATTEMPTS
+from map3d.messages import verbatim
 from map3d.operations.operation_worker import OperationWorker
 from map3d.types import BlockId
 from map3d.uploads import Uploads
@@ -177,7 +178,7 @@ def test_jobs_are_counted_and_failures_have_reasons(api: Api) -> None:
     for _ in range(2 * MAX_ATTEMPTS):
         lease = catalogue.lease("tea", "w")
         assert lease is not None
-        catalogue.fail(lease, "too dark") if lease.block.x else catalogue.release(lease)
+        catalogue.fail(lease, verbatim("too dark")) if lease.block.x else catalogue.release(lease)
     catalogue.close()
     jobs = api.get("/renderings/tea/jobs")
     assert (jobs["complete"], sum(jobs["counts"].values())) == (False, 3)
@@ -251,10 +252,13 @@ def test_a_town_from_upload_to_published_map(empty: Api) -> None:
         ended = empty.get(f"/operations/{asked['id']}")
         log = empty.get(f"/operations/{asked['id']}/log")
         assert ended["state"] == OperationState.DONE, log
-        assert log["lines"][-1]["text"] == f"done: {ended['message']}"
+        last = log["lines"][-1]
+        assert (last["text"], last["text_code"]) == (f"done: {ended['message']}", "operation-done")
+        assert last["text_values"]["message"] == {"code": ended["message_code"], "values": ended["message_values"]}
         assert empty.get(f"/operations/{asked['id']}/log?after={log['next']}") == {"lines": [], "next": log["next"]}
         return ended
 
+    assert empty.post("/scenes", {"name": "town", "crs": "EPSG:999999"}, 400)["code"] == "crs-unusable"
     empty.post("/scenes", {"name": "town"}, 201)
     uploads, data = Uploads(empty.workspace.root / "uploads"), house(0, 0, 9).encode()
     upload = uploads.create("anna", "hut.obj", len(data))
@@ -287,7 +291,7 @@ def test_a_town_from_upload_to_published_map(empty: Api) -> None:
     asked = {"kind": "remove", "target": "town", "arguments": {"what": "scene", "with_renderings": True}}
     assert "scene town: is published in published/town" in empty.post("/operations", asked, 400)["detail"]
     message = do("remove", what="scene", with_renderings=True, folders=["town"])["message"]
-    assert str(message).startswith("removed scene town with 1 file, 2 renderings and 1 published folder, ")
+    assert str(message).startswith("removed scene town with 1 file, 2 renderings, 1 published folder, ")
     assert not (empty.workspace.root / "published" / "town").exists()
     assert empty.get("/scenes")["scenes"] == []
 

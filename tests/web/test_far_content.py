@@ -27,8 +27,8 @@ def test_the_page_names_what_is_left_out_and_each_choice_is_built(studio, tmp_pa
     page = unescape(studio.get("/studio/scenes/far").text)
     assert kept(studio) == ((1,), 108)
     assert "108 triangles lie far from the rest and are left out:" in page
-    assert "town-1.obj: 108 triangles, up to 200 km away, e.g. of town-1" in page
-    assert "1 object, 128 m × 130 m around 64, 65" in page
+    assert "town-1.obj: 108 triangles, up to 200 km away: town-1" in page
+    assert "1 object, 192 triangles, 128 m × 130 m around 64, 65" in page
     assert page.count("Show this place instead") == 1
     assert "Show the largest place only" not in page
     studio.post("/studio/scenes/far/build", cluster="2")

@@ -9,6 +9,7 @@ from flask import Flask
 from map3d.catalogue import OperationState, PlannedJob, Workspace
 from map3d.catalogue.states import MAX_ATTEMPTS
 from map3d.errors import BadRequest, NotFound
+from map3d.messages import verbatim
 from map3d.operations.operation_worker import OperationWorker
 from map3d.operations.uploaded_files import IMPORT_FOLDERS
 from map3d.types import BlockId
@@ -80,7 +81,7 @@ def test_reports_and_logs_of_the_api_name_files_alone(tmp_path: Path, monkeypatc
     text = json.dumps(answers)
     assert ("broken.obj" in text, "hut.obj" in text) == (True, True)
     assert [place for place in (str(tmp_path), "hidden", "/etc", ".operation-") if place in text] == []
-    stored = " ".join(line.text for record in catalogue.operations() for line in catalogue.operation_log(record.id))
+    stored = " ".join(str(line.text) for record in catalogue.operations() for line in catalogue.operation_log(record.id))
     assert str(data) in stored, "the server's own log still has the whole path"
     client.close()
     catalogue.close()
@@ -92,7 +93,7 @@ def test_reasons_of_failed_blocks_name_no_folder(api: Api) -> None:
     for _ in range(MAX_ATTEMPTS):
         lease = catalogue.lease("tea", "w")
         assert lease is not None
-        catalogue.fail(lease, f"{api.workspace.root.absolute()}/renderings/tea/tiles.sqlite and /srv/secret/disk are full")
+        catalogue.fail(lease, verbatim(f"{api.workspace.root.absolute()}/renderings/tea/tiles.sqlite and /srv/secret/disk are full"))
     catalogue.close()
     found = api.get("/renderings/tea/failures")["failures"]
     assert [failure["reason"] for failure in found] == ["renderings/tea/tiles.sqlite and disk are full"]

@@ -12,6 +12,7 @@ from PIL import Image
 from werkzeug.datastructures import MultiDict
 
 from map3d.catalogue import OperationState, Workspace
+from map3d.messages import verbatim
 from map3d.operations.operation_worker import OperationWorker
 from map3d.previews import preview_pool
 from map3d.previews.preview_pool import PreviewPool
@@ -424,7 +425,7 @@ def test_quarantined_blocks_are_listed_with_their_reasons(town):
     catalogue.reopen("map", blocks)
     for _ in range(3):
         lease = catalogue.lease("map", "w")
-        catalogue.fail(lease, "out of memory: 512 MB")
+        catalogue.fail(lease, verbatim("out of memory: 512 MB"))
     catalogue.close()
     page = town.get("/studio/renderings/map").text
     assert "Blocks in quarantine" in page

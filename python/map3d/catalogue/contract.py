@@ -8,6 +8,7 @@ from map3d.catalogue.operation_contract import OperationCatalogue
 from map3d.catalogue.records import AssetRecord, Job, JobResult, Lease, PlanCounts, PlannedJob, RenderingRecord, SceneCrs, SceneRecord
 from map3d.catalogue.states import State
 from map3d.geometry.frames import PinnedFrame
+from map3d.messages import Message
 from map3d.types import BlockId, Layer, Vec3
 
 LEASE_S = 60.0
@@ -151,7 +152,7 @@ class Catalogue(OperationCatalogue, Protocol):
         """Marks the job as done, then opens the reduce job above when all blocks below it are done; raises StaleFence. After a kill between the two
         steps, `sweep` does the second."""
 
-    def fail(self, lease: Lease, reason: str) -> State:
+    def fail(self, lease: Lease, reason: Message) -> State:
         """Returns the new state: todo, or quarantined after the third attempt. Raises StaleFence."""
 
     def release(self, lease: Lease) -> None:

@@ -10,6 +10,7 @@ from map3d.catalogue.codec import dump_bits, load_bits
 from map3d.catalogue.records import Job, JobResult, Lease, PlannedJob
 from map3d.catalogue.states import State
 from map3d.geometry.morton import morton
+from map3d.messages import load_text
 from map3d.types import BlockId
 
 Document = dict[str, Any]
@@ -97,12 +98,13 @@ def load_lease(document: Document, content_version: int) -> Lease:
 
 
 def load_job(document: Document) -> Job:
-    names = ("rendering", "track", "kind", "key", "attempts", "expiries", "fence", "worker", "reason")
+    names = ("rendering", "track", "kind", "key", "attempts", "expiries", "fence", "worker")
     state = State(document["state"])
     return Job(
         **{name: document[name] for name in names},
         block=_block(document),
         state=state,
+        reason=load_text(document["reason"]),
         expires_s=_expires_s(document) if state is State.LEASED else None,
         ground=_ground(document),
         leased_s=_seconds(document["leased"]),

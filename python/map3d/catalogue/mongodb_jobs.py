@@ -16,6 +16,7 @@ from map3d.catalogue.mongodb_plan import PAGE, MongoPlan
 from map3d.catalogue.records import Job, JobResult, Lease
 from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, JobEvent, State, next_state
 from map3d.errors import StaleFence
+from map3d.messages import Message, dump_text, message
 from map3d.types import BlockId
 
 _EXPIRE_EVERY: Final = 0.25
@@ -112,10 +113,10 @@ class MongoJobs(MongoPlan):
         document = self._move(lease, {"$set": change, "$currentDate": {"ended": True}})
         self._open_above(document["parent"])
 
-    def fail(self, lease: Lease, reason: str) -> State:
+    def fail(self, lease: Lease, reason: Message) -> State:
         again = next_state(State.LEASED, JobEvent.FAIL)
         state = State.QUARANTINED if again is None or lease.attempt >= MAX_ATTEMPTS else again
-        self._move(lease, {"$set": {"state": state, "worker": None, "reason": reason}})
+        self._move(lease, {"$set": {"state": state, "worker": None, "reason": dump_text(reason)}})
         return state
 
     def release(self, lease: Lease) -> None:
@@ -143,7 +144,7 @@ class MongoJobs(MongoPlan):
             "expiries": expiries,
             "attempts": document["attempts"] - 1,
             "worker": None,
-            "reason": f"lease expired {expiries} time{'s' if expiries > 1 else ''} (last worker: {document['worker']})",
+            "reason": dump_text(message("lease-expired", count=expiries, worker=document["worker"])),
         }
         held = {"_id": document["_id"], "state": State.LEASED, "fence": document["fence"], **condition}
         return self._update_many(held, {"$set": change})

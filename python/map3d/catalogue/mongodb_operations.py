@@ -18,6 +18,7 @@ from map3d.catalogue.operation_contract import LOG_PAGE
 from map3d.catalogue.operation_records import ENDED, REPEATABLE, UNENDED, LogLine, NewOperation, OperationLease, OperationRecord, OperationState
 from map3d.catalogue.states import MAX_EXPIRIES
 from map3d.errors import NotFound, StaleFence
+from map3d.messages import Message, dump_text, load_text, verbatim
 
 _WAITING, _RUNNING = OperationState.WAITING, OperationState.RUNNING
 _ENDED_NOW: Final = {"$currentDate": {"ended": True}}
@@ -74,7 +75,7 @@ class MongoOperations(MongoJobs):
     def cancel_operation(self, id: str) -> OperationRecord:
         """Ends the operation itself when its worker's lease is overdue."""
         number = self._operation(rules.operation_number(id))["_id"]
-        cancelled = {"state": OperationState.CANCELLED, "message": "cancelled"}
+        cancelled = {"state": OperationState.CANCELLED, "message": rules.CANCELLED_MESSAGE}
         self._update_many({"_id": number, "state": _WAITING}, {"$set": cancelled, **_ENDED_NOW}, "operation")
         self._update_many({"_id": number, "state": _RUNNING}, {"$set": {"cancelling": True}}, "operation")
         document = self._operation(number)
@@ -108,12 +109,12 @@ class MongoOperations(MongoJobs):
             self._free_scene(scene, number, fence)
         return None
 
-    def heartbeat_operation(self, lease: OperationLease, stage: str, done: int, total: int) -> bool:
-        progress = {"$set": {"stage": stage, "done": done, "total": total}}
+    def heartbeat_operation(self, lease: OperationLease, stage: Message, done: int, total: int) -> bool:
+        progress = {"$set": {"stage": dump_text(stage), "done": done, "total": total}}
         running = {**_place(lease), "state": _RUNNING}
         return self._renew(lease) and bool(self._update_many(running, progress, "operation")) and not self._operation(_number(lease))["cancelling"]
 
-    def append_log(self, lease: OperationLease, lines: Sequence[str]) -> None:
+    def append_log(self, lease: OperationLease, lines: Sequence[Message]) -> None:
         """Reserves the numbers of the lines first; a kill before they are stored leaves a gap."""
         texts, call, number = rules.log_texts(lines), new_call(), _number(lease)
         operations, half = self._connection.collection("operation"), rules.MAX_LOG_LINES // 2
@@ -140,11 +141,13 @@ class MongoOperations(MongoJobs):
     def operation_log(self, id: str, after: int = 0, limit: int = LOG_PAGE) -> list[LogLine]:
         number = self._operation(rules.operation_number(id))["_id"]
         found = self._find("operation_log", {"_id": {"$gt": _line_id(number, after), "$lt": _end_of_log(number)}}, limit=limit)
-        return rules.with_gaps([LogLine(document["number"], document["time"], document["text"]) for document in found], after)
+        return rules.with_gaps(
+            [LogLine(document["number"], document["time"], load_text(document["text"]) or verbatim("")) for document in found], after
+        )
 
-    def end_operation(self, lease: OperationLease, state: OperationState, message: str = "") -> None:
+    def end_operation(self, lease: OperationLease, state: OperationState, message: Message | None = None) -> None:
         """Frees the scene last; after a kill before that, it is free when the lease is overdue."""
-        change = {"$set": {"state": OperationState(state), "message": message, "worker": None, "cancelling": False}, **_ENDED_NOW}
+        change = {"$set": {"state": OperationState(state), "message": dump_text(message), "worker": None, "cancelling": False}, **_ENDED_NOW}
         ended = self._renew(lease) and self._update_many({**_place(lease), "state": _RUNNING}, change, "operation")
         if not ended and not self._find("operation", {**_place(lease), "state": OperationState(state)}):
             raise _stale(lease)
@@ -224,7 +227,7 @@ class MongoOperations(MongoJobs):
         return self._update_many(running | {"cancelling": False}, change, "operation")
 
     def _end_cancelled(self, running: Document) -> int:
-        change = {"state": OperationState.CANCELLED, "message": "cancelled", "worker": None, "cancelling": False}
+        change = {"state": OperationState.CANCELLED, "message": rules.CANCELLED_MESSAGE, "worker": None, "cancelling": False}
         return self._update_many(running | {"cancelling": True}, {"$set": change, **_ENDED_NOW}, "operation")
 
     def _operation(self, number: int) -> Document:
@@ -264,11 +267,13 @@ class MongoOperations(MongoJobs):
 
 
 def _load(document: Document) -> OperationRecord:
-    names = ("kind", "target", "scene", "stage", "done", "total", "message", "asked_by", "created", "started", "ended", "worker", "cancelling")
+    names = ("kind", "target", "scene", "done", "total", "asked_by", "created", "started", "ended", "worker", "cancelling")
     return OperationRecord(
         id=str(document["_id"]),
         arguments=json.loads(document["arguments"]),
         state=OperationState(document["state"]),
+        stage=load_text(document["stage"]),
+        message=load_text(document["message"]),
         **{name: document[name] for name in names},
     )
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
 from map3d.catalogue.operation_records import LogLine, OperationLease, OperationRecord, OperationState
+from map3d.messages import Message
 
 LOG_PAGE = 1_000
 
@@ -32,17 +33,17 @@ class OperationCatalogue(Protocol):
     def lease_operation(self, worker: str) -> OperationLease | None:
         """Leases the oldest waiting operation of a scene that has no running one, after expiring overdue leases; None when there is none."""
 
-    def heartbeat_operation(self, lease: OperationLease, stage: str, done: int, total: int) -> bool:
+    def heartbeat_operation(self, lease: OperationLease, stage: Message, done: int, total: int) -> bool:
         """Renews the lease and stores the progress. Returns False when the operation was cancelled or the lease is no longer held: the worker then
         stops the work; it ends a cancelled operation with `end_operation`."""
 
-    def append_log(self, lease: OperationLease, lines: Sequence[str]) -> None:
+    def append_log(self, lease: OperationLease, lines: Sequence[Message]) -> None:
         """Adds lines to the log, which keeps the first and the latest MAX_LOG_LINES / 2 lines. Raises StaleFence."""
 
     def operation_log(self, id: str, after: int = 0, limit: int = LOG_PAGE) -> list[LogLine]:
         """Returns the lines after number `after`, in order; a line with the missing number says how many lines are not kept. Raises NotFound."""
 
-    def end_operation(self, lease: OperationLease, state: OperationState, message: str = "") -> None:
+    def end_operation(self, lease: OperationLease, state: OperationState, message: Message | None = None) -> None:
         """Ends the operation as done, failed or cancelled; may be repeated. Raises StaleFence when the lease is no longer held."""
 
     def release_operation(self, lease: OperationLease) -> None:

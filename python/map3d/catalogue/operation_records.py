@@ -8,12 +8,14 @@ from enum import StrEnum
 from typing import Any, Final
 
 from map3d.errors import BadRequest, LimitExceeded, NotFound
+from map3d.messages import Message, dump_text, message, verbatim
 
 OPERATION_KINDS: Final = ("import", "build", "render", "publish", "remove")
 MAX_ARGUMENTS_BYTES: Final = 1 << 20
 MAX_LOG_LINES: Final = 10_000
 """Lines that the log of one operation keeps: the first half of them and the latest half."""
 MAX_LINE_CHARACTERS: Final = 2_000
+"""Characters of each text in a line."""
 MAX_ENDED: Final = 1_000
 """Ended operations that the catalogue keeps; older ones are removed with their logs when another operation is created."""
 _LONGEST_ID: Final = 15
@@ -45,10 +47,10 @@ class OperationRecord:
     target: str
     arguments: Mapping[str, Any]
     state: OperationState
-    stage: str
+    stage: Message | None
     done: int
     total: int
-    message: str
+    message: Message | None
     asked_by: str
     created: datetime
     started: datetime | None = None
@@ -73,7 +75,7 @@ class LogLine:
 
     number: int
     time: datetime
-    text: str
+    text: Message
 
 
 @dataclass(frozen=True)
@@ -113,10 +115,22 @@ def operation_number(id: str) -> int:
     return int(id)
 
 
-def log_texts(lines: Iterable[str]) -> list[str]:
-    """Returns the lines as the log stores them: one line each, cut where they are too long."""
-    single = (part for line in lines for part in (line.splitlines() or [""]))
-    return [line if len(line) <= MAX_LINE_CHARACTERS else line[: MAX_LINE_CHARACTERS - 1] + "…" for line in single]
+CANCELLED_MESSAGE: Final = dump_text(Message("cancelled"))
+"""How an operation ends that was cancelled before it ran."""
+
+
+def log_texts(lines: Iterable[Message]) -> list[str]:
+    """Returns the lines as the log stores them: one line each, their texts cut where they are too long."""
+    return [dump_text(part.map_texts(_one_line)) for line in lines for part in _single(line)]
+
+
+def _single(line: Message) -> list[Message]:
+    return [verbatim(text) for text in str(line).splitlines() or [""]] if line.code == "verbatim" else [line]
+
+
+def _one_line(text: str) -> str:
+    single = " ".join(text.splitlines())
+    return single if len(single) <= MAX_LINE_CHARACTERS else single[: MAX_LINE_CHARACTERS - 1] + "…"
 
 
 def with_gaps(lines: Sequence[LogLine], after: int) -> list[LogLine]:
@@ -124,7 +138,7 @@ def with_gaps(lines: Sequence[LogLine], after: int) -> list[LogLine]:
     noted = []
     for line in lines:
         if line.number > after + 1:
-            noted.append(LogLine(line.number - 1, line.time, f"… {line.number - after - 1:,} lines are not kept …"))
+            noted.append(LogLine(line.number - 1, line.time, message("log-lines-left-out", count=line.number - after - 1)))
         noted.append(line)
         after = line.number
     return noted
@@ -139,4 +153,5 @@ def uncancellable(operation: OperationRecord) -> BadRequest:
 
 
 def expiry_message(expiries: int) -> str:
-    return f"the worker died {expiries} times during this operation; fix the cause, then retry"
+    """Returns the message as the catalogue stores it."""
+    return dump_text(Message("worker-ended", {"count": expiries}))

@@ -9,6 +9,7 @@ from map3d.catalogue.states import State
 from map3d.geometry.frames import PinnedFrame, Window
 from map3d.geometry.heights import Heights, find_vertical_epsg, heights_of
 from map3d.geometry.views import track_id
+from map3d.messages import Message
 from map3d.types import BlockId, BlockKind, Box, Layer, Vec3
 
 LOCAL_CRS_NAME = "local metres"
@@ -208,7 +209,7 @@ class Job:
     fence: int
     worker: str | None
     expires_s: float | None
-    reason: str | None
+    reason: Message | None
     result: JobResult | None
     ground: int = 0
     leased_s: float | None = None

@@ -7,6 +7,7 @@ from typing import Any, Final
 from map3d.catalogue.codec import dump_bits, load_bits
 from map3d.catalogue.records import Job, JobResult, Lease, PlannedJob
 from map3d.catalogue.states import State
+from map3d.messages import load_text
 from map3d.types import BlockId
 
 JOB_NEXT: Final = "CREATE INDEX job_next ON job(rendering, state, attempts + expiries, z, ground, track, morton)"
@@ -94,7 +95,7 @@ def load_job(row: sqlite3.Row) -> Job:
         expires_s=row["expires"],
         leased_s=row["leased"],
         ended_s=row["ended"],
-        reason=row["reason"],
+        reason=load_text(row["reason"]),
         result=None if row["version"] is None else _load_result(row),
         ground=row["ground"],
     )

@@ -11,6 +11,7 @@ from map3d.catalogue.sqlite_job_table import AT, RESULT, load_job, load_lease, p
 from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, JobEvent, State, next_state
 from map3d.database import NOW, Database
 from map3d.errors import StaleFence
+from map3d.messages import Message, dump_text
 from map3d.types import BlockId
 
 PLAN_BATCH: Final = 5_000
@@ -21,7 +22,7 @@ PAGE: Final = 2_000
 _AFTER_FAILURE: Final = f"CASE WHEN attempts >= {MAX_ATTEMPTS} THEN '{State.QUARANTINED}' ELSE '{next_state(State.LEASED, JobEvent.FAIL)}' END"
 _AFTER_EXPIRY: Final = f"CASE WHEN expiries + 1 >= {MAX_EXPIRIES} THEN '{State.QUARANTINED}' ELSE '{next_state(State.LEASED, JobEvent.EXPIRE)}' END"
 _EXPIRE: Final = f"""UPDATE job SET state = {_AFTER_EXPIRY}, attempts = attempts - 1, expiries = expiries + 1, worker = NULL, expires = NULL,
-  reason = 'lease expired ' || (expiries + 1) || iif(expiries, ' times', ' time') || ' (last worker: ' || worker || ')'
+  reason = json_object('code', 'lease-expired', 'values', json_object('count', expiries + 1, 'worker', worker))
   WHERE state = '{State.LEASED}'"""
 _EXPIRE_OVERDUE: Final = f"{_EXPIRE} AND expires < {NOW}"
 _NEXT: Final = f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}'
@@ -128,9 +129,9 @@ class SqliteJobs:
     def _open_above(self, db: sqlite3.Connection, row: sqlite3.Row) -> None:
         sqlite_plan.open_above(db, row)
 
-    def fail(self, lease: Lease, reason: str) -> State:
+    def fail(self, lease: Lease, reason: Message) -> State:
         with self._database.transaction() as db:
-            row = _move(db, lease, f"state = {_AFTER_FAILURE}, worker = NULL, expires = NULL, reason = :reason", reason=reason)
+            row = _move(db, lease, f"state = {_AFTER_FAILURE}, worker = NULL, expires = NULL, reason = :reason", reason=dump_text(reason))
         return State(row["state"])
 
     def release(self, lease: Lease) -> None:

@@ -13,6 +13,7 @@ from map3d.catalogue.sqlite_jobs import SqliteJobs
 from map3d.catalogue.states import MAX_EXPIRIES
 from map3d.database import NOW
 from map3d.errors import NotFound, StaleFence
+from map3d.messages import Message, dump_text, load_text, verbatim
 
 OPERATION_SCHEMA: Final = """
 CREATE TABLE operation(number INTEGER PRIMARY KEY AUTOINCREMENT, kind TEXT NOT NULL, target TEXT NOT NULL, scene TEXT NOT NULL,
@@ -28,7 +29,7 @@ CREATE TABLE operation_log(operation INTEGER NOT NULL, number INTEGER NOT NULL, 
 """The unique index keeps two operations of one scene from running at the same time."""
 
 _EXPIRE: Final = f"""UPDATE operation SET worker = NULL, expires = NULL, fence = fence + 1, expiries = expiries + 1,
-  ended = iif(cancelling OR expiries + 1 >= {MAX_EXPIRIES}, {NOW}, NULL), message = CASE WHEN cancelling THEN 'cancelled'
+  ended = iif(cancelling OR expiries + 1 >= {MAX_EXPIRIES}, {NOW}, NULL), message = CASE WHEN cancelling THEN '{rules.CANCELLED_MESSAGE}'
     WHEN expiries + 1 >= {MAX_EXPIRIES} THEN '{rules.expiry_message(MAX_EXPIRIES)}' ELSE message END,
   state = CASE WHEN cancelling THEN '{OperationState.CANCELLED}' WHEN expiries + 1 >= {MAX_EXPIRIES} THEN '{OperationState.FAILED}'
     ELSE '{OperationState.WAITING}' END, cancelling = 0 WHERE state = '{OperationState.RUNNING}'"""
@@ -77,7 +78,7 @@ class SqliteOperations(SqliteJobs):
         with self._database.transaction() as db:
             number = _row(db, id)["number"]
             db.execute(f"{_EXPIRE} AND number = ? AND expires < {NOW}", (number,))
-            change = f"state = '{OperationState.CANCELLED}', ended = {NOW}, message = 'cancelled'"
+            change = f"state = '{OperationState.CANCELLED}', ended = {NOW}, message = '{rules.CANCELLED_MESSAGE}'"
             db.execute(f"UPDATE operation SET {change} WHERE number = ? AND state = '{OperationState.WAITING}'", (number,))
             db.execute(f"UPDATE operation SET cancelling = 1 WHERE number = ? AND state = '{OperationState.RUNNING}'", (number,))
             found = _load(_row(db, id))
@@ -105,14 +106,14 @@ class SqliteOperations(SqliteJobs):
             row = db.execute(_LEASE, (worker, self.lease_s)).fetchone()
         return None if row is None else OperationLease(_load(row), worker, row["fence"])
 
-    def heartbeat_operation(self, lease: OperationLease, stage: str, done: int, total: int) -> bool:
+    def heartbeat_operation(self, lease: OperationLease, stage: Message, done: int, total: int) -> bool:
         change = f"expires = {NOW} + :lease_s, stage = :stage, done = :done, total = :total"
         with self._database.transaction() as db:
-            values = {**_place(lease), "lease_s": self.lease_s, "stage": stage, "done": done, "total": total}
+            values = {**_place(lease), "lease_s": self.lease_s, "stage": dump_text(stage), "done": done, "total": total}
             row = db.execute(f"UPDATE operation SET {change} WHERE {_HELD} RETURNING cancelling", values).fetchone()
         return row is not None and not row["cancelling"]
 
-    def append_log(self, lease: OperationLease, lines: Sequence[str]) -> None:
+    def append_log(self, lease: OperationLease, lines: Sequence[Message]) -> None:
         texts, half = rules.log_texts(lines), rules.MAX_LOG_LINES // 2
         with self._database.transaction() as db:
             place = _place(lease)
@@ -129,12 +130,14 @@ class SqliteOperations(SqliteJobs):
         query = "SELECT * FROM operation_log WHERE operation = ? AND number > ? ORDER BY number LIMIT ?"
         with self._database.reading() as db:
             rows = db.execute(query, (_row(db, id)["number"], after, limit)).fetchall()
-        return rules.with_gaps([LogLine(row["number"], datetime.fromtimestamp(row["time"], UTC), row["text"]) for row in rows], after)
+        return rules.with_gaps(
+            [LogLine(row["number"], datetime.fromtimestamp(row["time"], UTC), load_text(row["text"]) or verbatim("")) for row in rows], after
+        )
 
-    def end_operation(self, lease: OperationLease, state: OperationState, message: str = "") -> None:
+    def end_operation(self, lease: OperationLease, state: OperationState, message: Message | None = None) -> None:
         change = f"state = :state, message = :message, ended = {NOW}, {_AGAIN}"
         with self._database.transaction() as db:
-            values = {**_place(lease), "state": OperationState(state), "message": message}
+            values = {**_place(lease), "state": OperationState(state), "message": dump_text(message)}
             if db.execute(f"UPDATE operation SET {change} WHERE {_HELD}", values).rowcount == 0:
                 ended = "SELECT 1 FROM operation WHERE number = :number AND state = :state AND fence = :fence"
                 if db.execute(ended, values).fetchone() is None:
@@ -142,7 +145,7 @@ class SqliteOperations(SqliteJobs):
 
     def release_operation(self, lease: OperationLease) -> None:
         state = f"iif(cancelling, '{OperationState.CANCELLED}', '{OperationState.WAITING}')"
-        change = f"state = {state}, ended = iif(cancelling, {NOW}, NULL), message = iif(cancelling, 'cancelled', message), {_AGAIN}"
+        change = f"state = {state}, ended = iif(cancelling, {NOW}, NULL), message = iif(cancelling, '{rules.CANCELLED_MESSAGE}', message), {_AGAIN}"
         with self._database.transaction() as db:
             if db.execute(f"UPDATE operation SET {change} WHERE {_HELD}", _place(lease)).rowcount == 0:
                 raise _stale(lease)
@@ -177,11 +180,13 @@ def _row(db: sqlite3.Connection, id: str) -> sqlite3.Row:
 
 
 def _load(row: sqlite3.Row) -> OperationRecord:
-    names = ("kind", "target", "scene", "stage", "done", "total", "message", "asked_by", "worker")
+    names = ("kind", "target", "scene", "done", "total", "asked_by", "worker")
     return OperationRecord(
         id=str(row["number"]),
         arguments=json.loads(row["arguments"]),
         state=OperationState(row["state"]),
+        stage=load_text(row["stage"]),
+        message=load_text(row["message"]),
         cancelling=bool(row["cancelling"]),
         created=datetime.fromtimestamp(row["created"], UTC),
         started=_time(row["started"]),

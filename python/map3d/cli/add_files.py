@@ -15,6 +15,7 @@ from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import print_json, print_table
 from map3d.cli.progress import progress_bar
 from map3d.ingest.findings import skipped_count
+from map3d.messages import Message
 from map3d.requests import AddFiles
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], request: Ad
         place = place_line(workspace, catalogue, scene)
     done, failed = result.imported, result.failed
     if as_json:
-        print_json({"imported": done, "failed": [{"source": path, "error": text} for path, text in failed]})
+        print_json({"imported": done, "failed": [{"source": path, **reason.named("error")} for path, reason in failed]})
     else:
         _print(place, scene, done, failed, result.ignored)
     if failed:
@@ -53,13 +54,13 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], request: Ad
 
 
 def _show(bar: Progress, task: Any) -> "OnFile":
-    def show(name: str, number: int, total: int, how_far: str) -> None:
+    def show(name: str, number: int, total: int, how_far: Message | None) -> None:
         bar.update(task, description=f"{name}: {how_far}" if how_far else f"{number + 1} of {total}: {name}")
 
     return show
 
 
-def _print(place: str | None, scene: str, done: Sequence[Any], failed: Sequence[tuple[str, str]], ignored: Sequence[tuple[str, str]]) -> None:
+def _print(place: str | None, scene: str, done: Sequence[Any], failed: Sequence[tuple[str, Message]], ignored: Sequence[tuple[str, str]]) -> None:
     rows = [(item.asset, item.format, item.objects, item.triangles, skipped_count(item.report), _placed(item.report)) for item in done]
     if rows:
         print_table(("asset", "format", "objects", "triangles", "skipped", "coordinates"), rows)

@@ -36,7 +36,7 @@ def show_report(scene: str, report: Mapping[str, Any]) -> None:
     """Prints the counts of the build and the problems with images."""
     log = console()
     for line in report.get("outlier_lines", ()):
-        log.print(line, style="yellow", markup=False)
+        log.print(str(line), style="yellow", markup=False)
     table = Table("count", "", title=f"built {scene}", title_justify="left", box=None, pad_edge=False, show_header=False)
     table.columns[0].justify = "right"
     for name, count in report.items():

@@ -13,6 +13,7 @@ from map3d.cli.import_reports import ignored_lines
 from map3d.cli.options import json_option
 from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.progress import progress_bar
+from map3d.messages import Message
 from map3d.requests import Inspect
 
 if TYPE_CHECKING:
@@ -46,8 +47,8 @@ def command(files: Sequence[Path], request: Inspect, as_json: bool) -> None:
 
 
 def _show(bar: Progress, task: Any) -> "OnFile":
-    def show(name: str, number: int, total: int, how_far: str) -> None:
-        bar.update(task, description=f"reading {name} ({number + 1} of {total}{', ' + how_far if how_far else ''})")
+    def show(name: str, number: int, total: int, how_far: Message | None) -> None:
+        bar.update(task, description=f"reading {name} ({number + 1} of {total}{f', {how_far}' if how_far else ''})")
 
     return show
 
@@ -87,17 +88,16 @@ def _print_one(file: "FileContents", crs: "SceneCrs | None") -> None:
 def _summary(found: "Inspection") -> Iterator[tuple[str, str | None]]:
     """Yields what holds for all files together."""
     from map3d.scenes.file_contents import sum_kinds
-    from map3d.scenes.outlier_lines import box_text, extent_text, place_text
+    from map3d.scenes.outlier_lines import box_text, cluster_message, middle_of
 
     yield "all", f"{plural(len(found.files), 'file')}, {size_text(sum(file.bytes for file in found.files))}"
     yield "coordinates", None if found.crs is None else f"{found.crs.name}{'' if found.crs.epsg is None else f' (EPSG:{found.crs.epsg})'}"
     yield "heights", None if found.crs is None else found.crs.heights_text
     if found.box is not None:
-        yield "extent", f"{box_text(found.box)}, around {place_text(found.box, found.crs)}"
+        yield "extent", f"{box_text(found.box)}, around {middle_of(found.box, found.crs)}"
     yield "objects", kinds_text(sum_kinds(found.files))
     for cluster in found.clusters[:MAX_ROWS]:
-        counts = f"{plural(cluster.objects, 'object')}, {plural(cluster.triangles, 'triangle')}"
-        yield f"place {cluster.number}", f"{counts}, {extent_text(cluster.box)} around {place_text(cluster.box, found.crs)}"
+        yield f"place {cluster.number}", str(cluster_message(cluster, found.crs))
     if found.clusters:
         yield "", "the files lie in places far from each other; a map shows the first of them unless --cluster or --keep-outliers is given"
 

@@ -95,6 +95,6 @@ def _state_text(operation: OperationRecord) -> str:
 def _progress_text(operation: OperationRecord) -> str:
     """Returns the stage of a running operation, or the message with which it ended."""
     if operation.ended is not None or not operation.stage:
-        return operation.message
+        return str(operation.message or "")
     counts = f" {operation.done:,} of {operation.total:,}" if operation.total else ""
     return f"{operation.stage}{counts}"

@@ -57,4 +57,13 @@ def _plain(value: Any) -> Any:
         return {**value.document, "text": str(value)}
     if isinstance(value, Finding):
         return value.document
-    return {item.name: getattr(value, item.name) for item in fields(value)} if is_dataclass(value) and not isinstance(value, type) else str(value)
+    return _members(value) if is_dataclass(value) and not isinstance(value, type) else str(value)
+
+
+def _members(value: Any) -> dict[str, Any]:
+    """Returns the fields of a record; a message is its English text, with its code and values beside it."""
+    members: dict[str, Any] = {}
+    for item in fields(value):
+        part = getattr(value, item.name)
+        members |= part.named(item.name) if isinstance(part, Message) else {item.name: part}
+    return members

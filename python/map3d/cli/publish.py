@@ -60,7 +60,7 @@ def publish_with_progress(workspace: Workspace, rendering: str, out: Any, **how:
         task = bar.add_task("publishing", total=None)
 
         def progress(stage: str, done: int, total: int) -> bool:
-            show_stage(bar, task, "publishing tiles" if stage == "publish" else f"publishing {stage}", done, total or None)
+            show_stage(bar, task, f"publishing {stage}", done, total or None)
             return True
 
         return publish(workspace, rendering, out, progress=progress, **how)

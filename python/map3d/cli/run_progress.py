@@ -9,7 +9,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from map3d.cli.output import counts_text, plural
 from map3d.cli.progress import progress_bar
 from map3d.jobs import events
-from map3d.jobs.event_messages import problem_text
+from map3d.jobs.event_messages import problem_message
 from map3d.jobs.events import RunEvent
 
 
@@ -90,4 +90,5 @@ def message(event: RunEvent) -> str:
         return f"waiting for {blocks} leased by another run; leases of a run that was killed on another host expire within a minute"
     if isinstance(event, events.RenderingLeft):
         return f"{event.rendering} is complete" if event.complete else f"{event.rendering} is incomplete; see map3d jobs {event.rendering}"
-    return problem_text(event)
+    problem = problem_message(event)
+    return str(problem) if problem else ""

@@ -18,6 +18,7 @@ from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
 from map3d.ingest.findings import skipped_count, warning_count
+from map3d.messages import Message
 from map3d.requests import Site
 
 if TYPE_CHECKING:
@@ -81,7 +82,7 @@ def _update_files(workspace: Workspace, catalogue: Catalogue, request: Site) -> 
     with progress_bar(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn()) as bar:
         task = bar.add_task("importing", total=None)
 
-        def report(name: str, done: int, total: int, how_far: str) -> None:
+        def report(name: str, done: int, total: int, how_far: Message | None) -> None:
             bar.update(task, description=f"importing {name}: {how_far}" if how_far else f"importing {name}", completed=done, total=total)
 
         summary = update_files(workspace, catalogue, site_files(request), report)

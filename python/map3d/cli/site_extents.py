@@ -7,7 +7,7 @@ from map3d.cli.file_tables import print_files
 from map3d.cli.output import plural, size_text, time_text
 from map3d.renderings.cost_estimate import estimate
 from map3d.scenes.file_contents import file_contents, union
-from map3d.scenes.outlier_lines import extent_text, outlier_lines, place_text
+from map3d.scenes.outlier_lines import extent_text, middle_of, outlier_lines
 from map3d.scenes.outliers import read_outliers
 from map3d.site.steps import SiteRendering
 
@@ -21,7 +21,7 @@ def print_extents(workspace: Workspace, catalogue: Catalogue, scene: str, *, was
     print_files(files)
     box = union([file.box for file in files])
     if box is not None:
-        click.echo(f"the scene covers {extent_text(box)} around {place_text(box, record.crs)}")
+        click.echo(f"the scene covers {extent_text(box)} around {middle_of(box, record.crs)}")
     if not was_built:
         for line in outlier_lines(read_outliers(workspace, scene), record.crs):
             click.echo(line, err=True)

@@ -11,6 +11,7 @@ from map3d.formats import FORMATS
 from map3d.formats.gzip_file import is_gzip, unpacked_head
 from map3d.formats.raster import RASTER, VIRTUAL_REFUSED, find_raster_format, is_virtual_raster
 from map3d.formats.source_format import SourceFormat
+from map3d.messages import message
 
 READABLE_FORMATS: Final = ", ".join(format.readable for format in FORMATS)
 _UNREADABLE: Final = {
@@ -44,10 +45,14 @@ def check_stored(path: Path) -> None:
     """Checks that reading the file ends: it is a regular file whose content is stored. Raises UnknownFormat, OSError."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
-        raise UnknownFormat(f"{path}: not a file but {_KINDS.get(stat.S_IFMT(status.st_mode), 'something else')}")
+        raise _unread(path, f"not a file but {_KINDS.get(stat.S_IFMT(status.st_mode), 'something else')}")
     stored = status.st_blocks * _BLOCK_BYTES
     if status.st_size > _MAX_SPARSE_BYTES and stored < status.st_size * _MIN_STORED:
-        raise UnknownFormat(f"{path}: a sparse file of {status.st_size:,} bytes, of which only {stored:,} are stored")
+        raise _unread(path, f"a sparse file of {status.st_size:,} bytes, of which only {stored:,} are stored")
+
+
+def _unread(path: Path, content: str) -> UnknownFormat:
+    return UnknownFormat(message("file-not-read", file=str(path), content=content))
 
 
 def detect_format(path: Path, *, virtual: bool = False) -> SourceFormat:
@@ -66,7 +71,8 @@ def detect_format(path: Path, *, virtual: bool = False) -> SourceFormat:
     format = next((format for format in FORMATS if format.detect(head, path)), None)
     if format is None or (packed and format is RASTER):
         content = "a raster; unpack it first" if format else _describe_unknown(path, head)
-        raise UnknownFormat(f"{path}: {'a gzip file of ' if packed else ''}{content}; map3d reads {READABLE_FORMATS}")
+        said = {"file": str(path), "content": f"{'a gzip file of ' if packed else ''}{content}"}
+        raise UnknownFormat(message("format-not-read", **said, formats=READABLE_FORMATS))
     return format
 
 

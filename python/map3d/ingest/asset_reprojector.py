@@ -15,6 +15,7 @@ from map3d.geometry.crs import has_ellipsoidal_heights, is_local, parse_crs, ver
 from map3d.ingest.coordinate_check import CoordinateCheck
 from map3d.ingest.crs_transformer import CrsTransformer, Points, choose_scene_crs
 from map3d.ingest.scene_crs import LOCAL, to_scene_crs
+from map3d.messages import message
 
 
 class AssetReprojector:
@@ -84,7 +85,7 @@ class AssetReprojector:
 
     def _check_crs_is_optional(self) -> None:
         if self._asset_crs is None and find_format(self._format).has_crs and not self._scene_is_local:
-            raise CrsError("the file does not name its CRS; name it with --crs, e.g. --crs EPSG:25832, or --crs local for plain metres")
+            raise CrsError(message("crs-missing"))
 
 
 def _with_vertical_crs(target: CRS, source: CRS) -> CRS:

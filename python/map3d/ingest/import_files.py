@@ -17,9 +17,10 @@ from map3d.ingest.relief_grids import AS_TERRAIN, ReliefGrids
 from map3d.ingest.sources import SourceDocument, find_sources
 from map3d.ingest.unfinished_imports import finish_imports
 from map3d.ingest.unpacked_archives import unpacked
+from map3d.messages import Message, verbatim
 
-OnFile = Callable[[str, int, int, str], None]
-"""Called with the name of the current file, the number of files before it, the number of all files, and what was read of it so far, as text."""
+OnFile = Callable[[str, int, int, Message | None], None]
+"""Called with the name of the current file, the number of files before it, the number of all files, and what was read of it so far."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class FilesImport:
 
     imported: list[Imported] = field(default_factory=list)
     unchanged: list[str] = field(default_factory=list)
-    failed: list[tuple[str, str]] = field(default_factory=list)
+    failed: list[tuple[str, Message]] = field(default_factory=list)
     ignored: list[tuple[str, str]] = field(default_factory=list)
 
 
@@ -54,7 +55,7 @@ def import_files(
         archives = {folder for folder, _ in found.archives}
         virtual = [path for path in found.paths if options.virtual_rasters and path not in archives]
         done = _import_files(workspace, catalogue, scene, found.paths, virtual, options, progress)
-        failed = [(found.original(path), found.original(reason)) for path, reason in done.failed]
+        failed = [(found.original(path), reason.map_texts(found.original)) for path, reason in done.failed]
         ignored = [(found.original(path), found.original(reason)) for path, reason in done.ignored]
         return FilesImport(done.imported, done.unchanged, failed, ignored)
 
@@ -73,7 +74,7 @@ def _import_files(
     sources = find_sources(
         files,
         options.name,
-        lambda path, reason: result.failed.append((str(path), reason)),
+        lambda path, reason: result.failed.append((str(path), verbatim(reason))),
         lambda path, reason: result.ignored.append((str(path), reason)),
         {asset.name: Path(asset.source) for asset in assets},
         virtual,
@@ -93,11 +94,11 @@ def _import_files(
             if grids.is_waiting and (not waiting or waiting[0].format == RASTER.name):
                 names = {asset.name: Path(asset.source) for asset in catalogue.assets(scene)}
                 waiting, failed = grids.place(waiting, names)
-                result.failed.extend(failed)
+                result.failed.extend((file, verbatim(reason)) for file, reason in failed)
                 continue
             source = waiting.pop(0)
             show = _show(progress, source.paths[0].name, number, number + len(waiting) + 1)
-            show("")
+            show(None)
             number += 1
             try:
                 if _is_unchanged(known.get(source.name), source, options):
@@ -113,7 +114,7 @@ def _import_files(
             except Map3dError as error:
                 if options.strict or (is_single and not result.imported and not result.unchanged):
                     raise
-                result.failed.append((str(source.paths[0]), str(error)))
+                result.failed.append((str(source.paths[0]), error.message))
     return result
 
 
@@ -139,5 +140,5 @@ def _is_unchanged(asset: AssetRecord | None, source: SourceDocument, options: Im
     return asset is not None and import_inputs(source, options).changes(asset) is None
 
 
-def _show(progress: OnFile | None, name: str, number: int, total: int) -> Callable[[str], None]:
+def _show(progress: OnFile | None, name: str, number: int, total: int) -> Callable[[Message | None], None]:
     return lambda how_far: None if progress is None else progress(name, number, total, how_far)

@@ -5,6 +5,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 from typing import Any, Final
 
@@ -26,6 +27,7 @@ from map3d.ingest.relief_grids import AS_TERRAIN, Grid
 from map3d.ingest.scene_crs import LOCAL
 from map3d.ingest.sources import SourceDocument
 from map3d.ingest.unfinished_imports import draft_path, finish_imports, mark_import, remove_dead_drafts, unmark_import
+from map3d.messages import Message, message
 from map3d.registry import Registry
 from map3d.subprocess import Failure, Limits
 from map3d.types import Box, Vec3
@@ -37,7 +39,7 @@ MAX_FROM_ORIGIN_M: Final = _core.MAX_FROM_ORIGIN_M
 _NOT_IN_PIECES: Final = ("strict", "max_object_bytes", "max_appearance_bytes")
 """Options on which the checkpoints of a terrain do not depend."""
 
-OnProgress = Callable[[str], None]
+OnProgress = Callable[[Message], None]
 """Called with the number of triangles or tiles read so far, as text."""
 
 
@@ -95,7 +97,7 @@ def import_file(
             if not report["triangles"] and report.get("grids"):
                 raise OnlyGrids(f"{source.paths[0]}: {AS_TERRAIN}", report["grids"])
             if not report["triangles"]:
-                raise ImportFailed(f"{source.paths[0]}: no usable triangle in the file{_list_skipped(report)}")
+                raise ImportFailed(_without_triangles(source, report))
             with scene_lock(workspace, scene):
                 finish_imports(workspace, catalogue, scene)
                 proposed = None if parsed["crs"] is None else SceneCrs(**parsed["crs"])
@@ -143,16 +145,16 @@ def _parse(
     shown = ImportProgress()
     try:
         subprocess, applied = parser.get(entry, limits)
-        message = subprocess.request(request, wall_s=limits.wall_s, on_progress=lambda counts: counts and progress and progress(shown.text(counts)))
+        answer = subprocess.request(request, wall_s=limits.wall_s, on_progress=lambda counts: counts and progress and progress(shown.message(counts)))
     except (SubprocessDied, LimitExceeded) as error:
         parser.stop()
         raise _parser_error(source, limits, error) from error
     except BaseException:
         parser.stop()
         raise
-    if isinstance(message, Failure):
-        raise _failure_error(source, message)
-    response: dict[str, Any] = message.value
+    if isinstance(answer, Failure):
+        raise _failure_error(source, answer)
+    response: dict[str, Any] = answer.value
     response["report"]["parser"] = {**applied, "address_space_bytes": limits.address_space_bytes, "cpu_s": limits.cpu_s}
     return response
 
@@ -246,8 +248,11 @@ def _crs_text(crs: SceneCrs | None) -> str | None:
     return "local" if crs.wkt is None else crs.wkt
 
 
-def _list_skipped(report: Mapping[str, Any]) -> str:
-    return "".join(f"; {item}" for item in findings(report) if item.skipped or item.reason.code == "nothing-at-lod")
+def _without_triangles(source: SourceDocument, report: Mapping[str, Any]) -> Message:
+    file, found = str(source.paths[0]), [item.line for item in findings(report) if item.skipped or item.reason.code == "nothing-at-lod"]
+    if not found:
+        return message("no-usable-triangle", file=file)
+    return message("no-usable-triangle-since", file=file, findings=reduce(lambda first, second: message("both", first=first, second=second), found))
 
 
 def _parser_error(source: SourceDocument, limits: Limits, error: SubprocessDied | LimitExceeded) -> ImportFailed | LimitExceeded:
@@ -255,13 +260,14 @@ def _parser_error(source: SourceDocument, limits: Limits, error: SubprocessDied 
         return LimitExceeded(f"{source.paths[0]}: {error}; raise the limit with --parse-memory or --parse-cpu")
     if isinstance(error, SubprocessTimedOut) and limits.wall_s is not None:
         return LimitExceeded(f"{source.paths[0]}: parsing took longer than {limits.wall_s:g} s; raise the limit with --parse-cpu")
-    return ImportFailed(f"{source.paths[0]}: the parser crashed and nothing was imported: {error}")
+    return ImportFailed(message("parser-crashed", file=str(source.paths[0]), reason=error.message))
 
 
 def _failure_error(source: SourceDocument, failure: Failure) -> Map3dError:
     kinds: dict[str, type[Map3dError]] = {"CrsError": CrsError, "LimitError": LimitExceeded, "LimitExceeded": LimitExceeded}
-    text = failure.message if str(source.paths[0]) in failure.message else f"{source.paths[0]}: {failure.message}"
+    path, said = str(source.paths[0]), failure.message
+    about = said if path in str(said) else message("about", what=path, message=said)
     if failure.kind in kinds:
-        return kinds[failure.kind](text)
+        return kinds[failure.kind](about)
     known = failure.kind in ("FormatError", "StorageError", "InvalidArgument") or hasattr(errors, failure.kind)
-    return ImportFailed(text if known else f"{source.paths[0]}: {failure.kind}: {failure.message}")
+    return ImportFailed(about if known else f"{path}: {failure.kind}: {said}")

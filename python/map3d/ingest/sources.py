@@ -17,6 +17,7 @@ from map3d.formats.gzip_file import unpacked_path
 from map3d.formats.raster import RASTER
 from map3d.formats.source_format import DocumentLinks, SourceFormat
 from map3d.ingest.virtual_raster import find_virtual_sources, is_virtual
+from map3d.messages import Message, message
 
 _COMPANION_SUFFIXES = {".txt", ".md", ".json", ".pdf", ".html", ".sqlite", *(suffix for format in FORMATS for suffix in format.companions)}
 _DOCUMENT_NAMES = ("license", "licence", "copying", "notice", "readme", "authors", "changelog", "changes")
@@ -123,7 +124,7 @@ def source_digest(source: SourceDocument) -> str:
 
 def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_ignored: OnUnreadable, *, virtual: bool = False) -> list[tuple[Path, SourceFormat]]:
     found: list[tuple[Path, SourceFormat]] = []
-    unknown: list[tuple[Path, str]] = []
+    unknown: list[tuple[Path, Message]] = []
     for path in sorted(path for path in _walk(folder) if path.exists() and not path.name.startswith(".")):
         if not path.suffix and path.name.lower().startswith(_DOCUMENT_NAMES):
             continue
@@ -132,23 +133,23 @@ def _search_folder(folder: Path, on_unreadable: OnUnreadable, on_ignored: OnUnre
             if (known := next((format for format in FORMATS if format.detect_companion(head, path)), None)) is not None:
                 found.append((path, known))
             elif path.suffix.lower() == ".json" and b'"CityJSON' in head:
-                unknown.append((path, "CityJSON; convert it to CityGML with citygml-tools"))
+                unknown.append((path, message("file-not-read", file=str(path), content="CityJSON; convert it to CityGML with citygml-tools")))
             continue
         try:
             found.append((path, detect_format(path, virtual=virtual)))
         except UnknownFormat as error:
-            unknown.append((path, str(error)))
+            unknown.append((path, error.message))
     if not found:
-        example = f" (found {unknown[0][1].partition(';')[0]})" if unknown else ""
+        example = f" (found {unknown[0][0]}: {unknown[0][1].values['content']})" if unknown else ""
         raise UnknownFormat(f"{folder}: no readable file in this folder{example}; map3d reads {READABLE_FORMATS}")
     used = _used_documents(folder, found, [path for path, _ in unknown])
     for path, reason in unknown:
         if path.resolve() in used:
             continue
         if unpacked_path(path).suffix.lower() in _SOURCE_SUFFIXES:
-            on_unreadable(path, reason)
+            on_unreadable(path, str(reason))
         else:
-            on_ignored(path, reason.removeprefix(f"{path}: ").partition("; map3d reads")[0])
+            on_ignored(path, reason.values["content"])
     return _without_named(found, folder) if virtual else found
 
 

@@ -12,12 +12,13 @@ from map3d.catalogue import Workspace
 from map3d.formats.archive_limits import ArchiveLimits
 from map3d.ingest.unfinished_imports import draft_path, remove_dead_drafts
 from map3d.ingest.zip_archive import is_zip, unpack
+from map3d.messages import Message, message
 
 NAME: Final = "_archives"
 """No name of an asset. The folder is a draft of this process: a later import removes it if this one is killed."""
 
-OnArchive = Callable[[str, int, int, str], None]
-"""Called with the name of an archive, the number of its entries that are unpacked, of all, and what happens, as text."""
+OnArchive = Callable[[str, int, int, Message], None]
+"""Called with the name of an archive, the number of its entries that are unpacked, of all, and what happens."""
 
 
 @dataclass(frozen=True)
@@ -68,4 +69,4 @@ def _unpack_all(folder: Path, files: Sequence[Path], progress: OnArchive, limits
 
 
 def _show(progress: OnArchive, name: str) -> Callable[[int, int], None]:
-    return lambda done, total: progress(name, done, total, "unpacking")
+    return lambda done, total: progress(name, done, total, message("unpacking"))

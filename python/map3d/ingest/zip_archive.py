@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from map3d.errors import ImportFailed, LimitExceeded, Map3dError, SubprocessDied
 from map3d.formats.archive_limits import ArchiveLimits
+from map3d.messages import message
 from map3d.subprocess import Failure, Handler, Limits, Subprocess
 
 _SIGNATURE: Final = b"PK\x03\x04"
@@ -52,7 +53,7 @@ def unpack(archive: Path, folder: Path, limits: ArchiveLimits, progress: Callabl
     except LimitExceeded as error:
         raise LimitExceeded(f"{name or archive.name}: {error}; the archive has too many entries; divide it") from error
     except SubprocessDied as error:
-        raise ImportFailed(f"{name or archive.name}: cannot be unpacked: {error}") from error
+        raise ImportFailed(message("archive-not-unpacked", file=name or archive.name, reason=error.message)) from error
     finally:
         process.close()
     if isinstance(answer, Failure):

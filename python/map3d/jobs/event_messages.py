@@ -1,18 +1,23 @@
-"""The problems of a run as lines of text, for terminals and logs."""
+"""The problems of a run as messages, for terminals and logs."""
 
 from map3d.jobs import events
 from map3d.jobs.events import RunEvent
+from map3d.messages import Message, message
 
 
-def problem_text(event: RunEvent) -> str:
-    """Returns the line that reports a problem, empty for other events."""
+def problem_message(event: RunEvent) -> Message | None:
+    """Returns the message that reports a problem, None for other events."""
     if isinstance(event, events.JobFailed):
-        lease = event.lease
-        return f"{lease.track} {lease.block}: attempt {lease.attempt} failed ({event.reason}); the block is now {event.state}"
+        state = message(f"block-{event.state}")
+        return message("block-failed", **_place(event), attempt=event.lease.attempt, reason=event.reason, state=state)
     if isinstance(event, events.LeaseLost):
-        return f"{event.lease.track} {event.lease.block}: lease lost: {event.reason}"
+        return message("lease-lost", **_place(event), reason=event.reason)
     if isinstance(event, events.SceneChanged):
-        return "files changed during the render"
+        return message("files-changed")
     if isinstance(event, events.WorkerExited) and event.reason:
-        return f"worker {event.worker} exited: {event.reason}"
-    return ""
+        return message("worker-exited", worker=event.worker, reason=event.reason)
+    return None
+
+
+def _place(event: events.JobFailed | events.LeaseLost) -> dict[str, str]:
+    return {"track": event.lease.track, "block": str(event.lease.block)}

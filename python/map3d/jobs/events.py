@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from map3d.catalogue import JobResult, Lease, PlanCounts, State
+from map3d.messages import Message
 
 
 @dataclass(frozen=True)
@@ -16,7 +17,7 @@ class JobFailed:
     """A job lost one attempt; `state` is its state afterwards."""
 
     lease: Lease
-    reason: str
+    reason: Message
     state: State
 
 
@@ -25,7 +26,7 @@ class LeaseLost:
     """A lease was released, or another worker took it over; the job was not committed as done."""
 
     lease: Lease
-    reason: str
+    reason: Message
 
 
 @dataclass(frozen=True)
@@ -33,16 +34,16 @@ class SceneChanged:
     """The scene was rebuilt after the job had been planned. The job was released without losing an attempt; a run that plans does so again."""
 
     lease: Lease
-    reason: str
+    reason: Message
 
 
 @dataclass(frozen=True)
 class WorkerExited:
-    """A worker exited. `reason` is empty when no jobs were left or the run was stopped; `jobs_failed`: it exited after too many failed jobs;
+    """A worker exited. `reason` is None when no jobs were left or the run was stopped; `jobs_failed`: it exited after too many failed jobs;
     `error`: an unexpected exception."""
 
     worker: str
-    reason: str = ""
+    reason: Message | None = None
     jobs_failed: bool = False
     error: BaseException | None = None
 

@@ -14,6 +14,8 @@ from map3d.catalogue import Catalogue, JobResult, Lease
 from map3d.errors import Map3dError, StaleFence, StalePlan, Stopped, SubprocessStartFailed
 from map3d.jobs.events import JobDone, JobFailed, JobOutcome, LeaseLost, SceneChanged
 from map3d.jobs.timeouts import Timeouts
+from map3d.messages import Message as Reason
+from map3d.messages import message, verbatim
 from map3d.subprocess import Failure, Message, Subprocess
 
 
@@ -65,33 +67,33 @@ class JobRunner:
                 self._catalogue.release(lease)
                 return SceneChanged(lease, response.message)
             if isinstance(response, Failure):
-                return self._fail(lease, f"{response.kind}: {response.message}")
+                return self._fail(lease, message("about", what=response.kind, message=response.message))
             with heartbeat.continued():
                 result = self._task.commit(lease, response)
             self._catalogue.done(lease, result)
             return JobDone(lease, result)
         except StaleFence as error:
             self.close()
-            return LeaseLost(lease, str(error))
+            return LeaseLost(lease, error.message)
         except Stopped as error:
             self.close()
-            return self._release(lease, str(error))
+            return self._release(lease, error.message)
         except Map3dError as error:
             self.close()
-            return self._fail(lease, str(error))
+            return self._fail(lease, error.message)
 
-    def _release(self, lease: Lease, reason: str) -> JobOutcome:
+    def _release(self, lease: Lease, reason: Reason) -> JobOutcome:
         try:
             self._catalogue.release(lease)
         except StaleFence as error:
-            return LeaseLost(lease, f"{reason}; {error}")
+            return LeaseLost(lease, verbatim(f"{reason}; {error}"))
         return LeaseLost(lease, reason)
 
-    def _fail(self, lease: Lease, reason: str) -> JobOutcome:
+    def _fail(self, lease: Lease, reason: Reason) -> JobOutcome:
         try:
             state = self._catalogue.fail(lease, reason)
         except StaleFence as error:
-            return LeaseLost(lease, f"{reason}; {error}")
+            return LeaseLost(lease, verbatim(f"{reason}; {error}"))
         return JobFailed(lease, reason, state)
 
     def close(self) -> None:

@@ -7,6 +7,7 @@ from typing import Final
 from map3d.catalogue import Catalogue, Job, State
 from map3d.catalogue.states import OPEN
 from map3d.jobs.dead_workers import process_of
+from map3d.messages import Message
 from map3d.process_identity import ProcessIdentity
 from map3d.types import BlockId
 
@@ -48,7 +49,7 @@ class FailingJob:
     state: State
     attempts: int
     expiries: int
-    reason: str | None
+    reason: Message | None
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from map3d.jobs.events import JobFailed, JobOutcome, RunEvent, SceneChanged, Wor
 from map3d.jobs.job_runner import JobRunner
 from map3d.jobs.open_jobs import has_jobs_left
 from map3d.jobs.timeouts import Timeouts
+from map3d.messages import verbatim
 
 
 class JobEnded:
@@ -53,9 +54,9 @@ class Worker:
         try:
             exited = self._work_on(report)
         except Map3dError as error:
-            exited = WorkerExited(self.name, str(error))
+            exited = WorkerExited(self.name, error.message)
         except BaseException as error:
-            exited = WorkerExited(self.name, f"{type(error).__name__}: {error}", error=error)
+            exited = WorkerExited(self.name, verbatim(f"{type(error).__name__}: {error}"), error=error)
         finally:
             self._runner.close()
             report(exited)
@@ -75,7 +76,7 @@ class Worker:
             if isinstance(event, SceneChanged):
                 break
             if len(self._failed) >= self._timeouts.failures:
-                return WorkerExited(self.name, f"failed {len(self._failed)} different jobs", jobs_failed=True)
+                return WorkerExited(self.name, verbatim(f"failed {len(self._failed)} different jobs"), jobs_failed=True)
         return WorkerExited(self.name)
 
     def _work_on_next(self) -> JobOutcome | None:

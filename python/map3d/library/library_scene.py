@@ -16,6 +16,7 @@ from map3d.library.on_progress import OnProgress, building
 from map3d.lifecycle.create_rendering import check_rendering, create_rendering
 from map3d.lifecycle.remove_files import find_files, is_built, remove_files
 from map3d.lifecycle.remove_scene import find_scene, remove_scene
+from map3d.messages import Message
 from map3d.requests import CreateRendering
 from map3d.scenes.build import build_if_stale
 from map3d.scenes.outliers import Outliers, choose_content, read_outliers
@@ -87,7 +88,7 @@ class LibraryScene:
             virtual_rasters=True,
         )
 
-        def show(file: str, number: int, total: int, how_far: str) -> None:
+        def show(file: str, number: int, total: int, how_far: Message | None) -> None:
             if progress is not None:
                 progress(f"importing {file}" + (f": {how_far}" if how_far else ""), number, total)
 

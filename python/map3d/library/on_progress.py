@@ -22,7 +22,7 @@ def publishing(progress: OnProgress | None) -> Callable[[str, int, int], bool]:
 
     def show(stage: str, done: int, total: int) -> bool:
         if progress is not None:
-            progress("publishing tiles" if stage == "publish" else f"publishing {stage}", done, total)
+            progress(f"publishing {stage}", done, total)
         return True
 
     return show

@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from map3d.catalogue import Catalogue, OperationRecord, OperationState, Workspace
+from map3d.messages import Message
 from map3d.operations.do_import import do_build, do_import
 from map3d.operations.do_removal import do_removal
 from map3d.operations.do_render import do_publish, do_render
 from map3d.operations.operation_report import OperationReport
 from map3d.subprocess import Handler
 
-DO: Final[Mapping[str, Callable[[Workspace, Catalogue, OperationRecord, OperationReport], str]]] = {
+DO: Final[Mapping[str, Callable[[Workspace, Catalogue, OperationRecord, OperationReport], Message]]] = {
     "import": do_import,
     "build": do_build,
     "render": do_render,
@@ -36,7 +37,7 @@ def open_operation(setup: dict[str, Any]) -> Handler:
         operation, report = _load(request), OperationReport(send)
         with workspace.open_catalogue() as catalogue:
             try:
-                return {"message": DO[operation.kind](workspace, catalogue, operation, report)}, []
+                return {"message": DO[operation.kind](workspace, catalogue, operation, report).document}, []
             finally:
                 report.flush()
 
@@ -46,4 +47,4 @@ def open_operation(setup: dict[str, Any]) -> Handler:
 def _load(request: Mapping[str, Any]) -> OperationRecord:
     fields = {name: value for name, value in request.items() if name != "created"}
     created = datetime.fromisoformat(request["created"])
-    return OperationRecord(**fields, state=OperationState.RUNNING, stage="", done=0, total=0, message="", created=created)
+    return OperationRecord(**fields, state=OperationState.RUNNING, stage=None, done=0, total=0, message=None, created=created)

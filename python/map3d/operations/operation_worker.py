@@ -10,7 +10,9 @@ from map3d.catalogue import Catalogue, OperationLease, OperationRecord, Operatio
 from map3d.errors import Map3dError, NotFound, StaleFence, StoreError
 from map3d.jobs.dead_workers import expire_dead_workers, process_of, worker_name
 from map3d.jobs.stop_request import StopRequest
+from map3d.messages import Message, load_message, message
 from map3d.operations.do_operation import request_of
+from map3d.operations.operation_report import STARTING
 from map3d.operations.uploaded_files import remove_staging, remove_upload
 from map3d.process_identity import ProcessIdentity
 from map3d.subprocess import Failure, Subprocess
@@ -78,11 +80,11 @@ class OperationWorker:
         self.on_operation(f"{name} begins")
         keeper = _LeaseKeeper(self.catalogue, lease, self.stop, self.heartbeat_s)
         try:
-            message = self._run_subprocess(lease, keeper)
+            ended = self._run_subprocess(lease, keeper)
             keeper.complete()
             state = OperationState.DONE
         except _Cancelled:
-            message, state = f"cancelled while {keeper.stage}", OperationState.CANCELLED
+            ended, state = message("cancelled-while", stage=keeper.stage), OperationState.CANCELLED
         except _Interrupted:
             self._clean_up(lease)
             if self.stop.is_made:
@@ -92,16 +94,16 @@ class OperationWorker:
         except Map3dError as error:
             if isinstance(error, StoreError | StaleFence):
                 raise
-            message, state = str(error), OperationState.FAILED
+            ended, state = error.message, OperationState.FAILED
         self._clean_up(lease)
-        self.catalogue.append_log(lease, [message if state is OperationState.CANCELLED else f"{state}: {message}"])
-        self.catalogue.end_operation(lease, state, message)
+        self.catalogue.append_log(lease, [ended if state is OperationState.CANCELLED else message(f"operation-{state}", message=ended)])
+        self.catalogue.end_operation(lease, state, ended)
         if state is OperationState.DONE and operation.kind == "import":
             self._remove_uploads(operation)
-        self.on_operation(f"{name} is {state}: {message}")
+        self.on_operation(f"{name} is {state}: {ended}")
         return True
 
-    def _run_subprocess(self, lease: OperationLease, keeper: "_LeaseKeeper") -> str:
+    def _run_subprocess(self, lease: OperationLease, keeper: "_LeaseKeeper") -> Message:
         """Returns the message of the operation's end. Raises the error with which it failed."""
         keeper.beat()
         setup = {"workspace": str(self.workspace.root.absolute()), "catalogue": self.workspace.catalogue_url}
@@ -113,7 +115,7 @@ class OperationWorker:
             process.close()
         if isinstance(answer, Failure):
             raise _error(answer)
-        return str(answer.value["message"])
+        return load_message(answer.value["message"])
 
     def _remove_uploads(self, operation: OperationRecord) -> None:
         """Removes the uploads of an import whose end is stored: before that, a repetition needs them."""
@@ -139,16 +141,17 @@ class _LeaseKeeper:
 
     def __init__(self, catalogue: Catalogue, lease: OperationLease, stop: StopRequest, every_s: float) -> None:
         self._catalogue, self._lease, self._stop, self._every_s = catalogue, lease, stop, every_s
-        self.stage, self._done, self._total = "starting", 0, 0
+        self.stage, self._done, self._total = STARTING, 0, 0
         self._beat_s = 0.0
 
     def on_progress(self, progress: dict[str, Any] | None) -> None:
         is_new = False
         if progress is not None:
-            is_new = progress["stage"].partition(":")[0] != self.stage.partition(":")[0]
-            self.stage, self._done, self._total = progress["stage"], progress["done"], progress["total"]
+            stage = load_message(progress["stage"])
+            is_new = _subject(stage) != _subject(self.stage)
+            self.stage, self._done, self._total = stage, progress["done"], progress["total"]
             if progress["lines"]:
-                self._catalogue.append_log(self._lease, progress["lines"])
+                self._catalogue.append_log(self._lease, [load_message(line) for line in progress["lines"]])
         if self._stop.is_made:
             raise _Interrupted
         if is_new or time.monotonic() - self._beat_s >= self._every_s:
@@ -170,6 +173,11 @@ class _LeaseKeeper:
             raise _Cancelled if cancelling else _Interrupted
 
 
+def _subject(stage: Message) -> str:
+    """Returns what the work is about: a file, or the stage itself."""
+    return str(stage.values.get("file", stage.code))
+
+
 def expire_dead_operations(catalogue: Catalogue, dropped: Collection[str] = ()) -> int:
     """Expires the leases of operation workers whose process was on this host and has ended; returns their number. `dropped`: workers that do nothing,
     although their process runs."""
@@ -187,5 +195,5 @@ def _error(failure: Failure) -> Map3dError:
     kind = getattr(errors, failure.kind, None)
     if isinstance(kind, type) and issubclass(kind, Map3dError):
         return kind(failure.message) if not issubclass(kind, StoreError | StaleFence | NotFound) else Map3dError(failure.message)
-    known = failure.kind.endswith("Error") and failure.kind in ("FormatError", "StorageError", "LimitError")
+    known = failure.kind in ("FormatError", "StorageError", "LimitError")
     return Map3dError(failure.message if known else f"{failure.kind}: {failure.message} (this is a bug in map3d; see the log of the worker)")

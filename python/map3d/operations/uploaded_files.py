@@ -12,6 +12,7 @@ from map3d.catalogue import Workspace
 from map3d.errors import BadRequest, NotFound
 from map3d.formats.archive_limits import ArchiveLimits
 from map3d.ingest.zip_archive import is_zip, unpack
+from map3d.messages import message
 from map3d.uploads import Uploads
 from map3d.uploads.uploads import DATA
 
@@ -84,7 +85,7 @@ def stage(
         packed = is_zip(file.path)
         target = folder / (Path(file.name).with_suffix("") if packed else file.name)
         if target.exists():
-            raise BadRequest(f"{file.name}: two of the uploaded files have this name; import them one after another")
+            raise BadRequest(message("upload-name-taken", file=file.name))
         target.parent.mkdir(parents=True, exist_ok=True)
         if packed:
             unpack(file.path, target, limits or ArchiveLimits(), _show(on_unpacked, file.name), file.name)

@@ -301,7 +301,7 @@ class _Publisher:
 
     def _advance(self, tiles: int) -> None:
         self._done += tiles
-        if not self._progress("publish", self._done, max(self._total, self._done)):
+        if not self._progress("tiles", self._done, max(self._total, self._done)):
             raise Stopped(f"publishing stopped after {self._done:,} tiles; publish again to resume")
 
 

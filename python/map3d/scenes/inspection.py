@@ -10,6 +10,7 @@ from map3d.catalogue import Catalogue, SceneCrs, SceneRecord, Workspace
 from map3d.ingest.content import Cluster, find_content
 from map3d.ingest.import_files import OnFile, import_files
 from map3d.ingest.import_options import ImportOptions
+from map3d.messages import Message
 from map3d.scenes.file_contents import FileContents, file_contents, union
 from map3d.types import Box
 
@@ -25,7 +26,7 @@ class Inspection:
     box: Box | None
     files: tuple[FileContents, ...]
     clusters: tuple[Cluster, ...]
-    failed: tuple[tuple[str, str], ...]
+    failed: tuple[tuple[str, Message], ...]
     ignored: tuple[tuple[str, str], ...]
 
 

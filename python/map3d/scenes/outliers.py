@@ -58,6 +58,10 @@ class Outliers:
     def triangles(self) -> int:
         return sum(file.triangles for file in self.files)
 
+    @property
+    def farthest_first(self) -> list[FileOutliers]:
+        return sorted(self.files, key=lambda file: (-file.distance_m, file.source))
+
 
 @dataclass
 class OutlierCheck:

@@ -20,9 +20,10 @@ from map3d.ingest.sources import SourceDocument, find_sources
 from map3d.ingest.unfinished_imports import finish_imports
 from map3d.lifecycle.remove_files import remove_built_files
 from map3d.lifecycle.remove_scene import finish_scene_removal
+from map3d.messages import Message
 
-OnSource = Callable[[str, int, int, str], None]
-"""Called with the name of the current file, the number of files done, and of all, and what was read of the file so far, as text."""
+OnSource = Callable[[str, int, int, Message | None], None]
+"""Called with the name of the current file, the number of files done, and of all, and what was read of the file so far."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ class _Update:
             for number, found in enumerate(sources):
                 source = self._with_grids(found) if found.format == RASTER.name and self._grids.is_waiting else found
                 show = partial(report, source.paths[0].name, number, len(sources))
-                show("")
+                show(None)
                 self._import_if_changed(source, parser, show)
             self._import_other_rasters(parser, report)
         if sources and not self._summary.imported and not self._summary.unchanged:

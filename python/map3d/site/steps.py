@@ -19,7 +19,7 @@ from map3d.requests import CreateRendering, Site
 from map3d.requests.renderings import DEFAULT_RADIUS_M
 from map3d.scenes.build import GROUND, open_scene
 from map3d.scenes.file_contents import file_contents, union
-from map3d.scenes.outlier_lines import outlier_lines, place_text
+from map3d.scenes.outlier_lines import middle_of, outlier_lines
 from map3d.scenes.outliers import read_outliers
 from map3d.site.files import ImportSummary, SiteFiles
 from map3d.site.report import SiteReport, read_report, view_names, write_report
@@ -97,12 +97,12 @@ def store_report(
     report = SiteReport(
         title=record.title or record.name,
         crs=None if scene.crs is None else scene.crs.name,
-        place="" if box is None else place_text(box, scene.crs),
+        place="" if box is None else str(middle_of(box, scene.crs)),
         box=box,
         files=tuple(replace(file, findings=tuple(_published(finding, file.source, folder) for finding in file.findings)) for file in files),
         failed=tuple((_without_folder(file, folder), _without_folder(reason, folder)) for file, reason in summary.failed),
         ignored=tuple(summary.ignored),
-        left_out=tuple(outlier_lines(read_outliers(workspace, request.name), scene.crs)),
+        left_out=tuple(map(str, outlier_lines(read_outliers(workspace, request.name), scene.crs))),
         views=view_names([frame.angles for frame in record.frames]),
         res_m=record.res_m,
         why="" if made.resolution is None else made.resolution.why,

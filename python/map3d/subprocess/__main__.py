@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from map3d.errors import Map3dError
+from map3d.messages import verbatim
 from map3d.subprocess.channel import Channel, Handler
 from map3d.subprocess.limits import Limits, die_with_parent
 
@@ -55,7 +57,8 @@ def _load(entry: str) -> Callable[[dict[str, Any]], Handler]:
 
 
 def _error(error: Exception) -> dict[str, Any]:
-    return {"error": {"kind": type(error).__name__, "message": str(error) or type(error).__name__}}
+    text = verbatim(str(error) or type(error).__name__)
+    return {"error": {"kind": type(error).__name__, "message": (error.message if isinstance(error, Map3dError) else text).document}}
 
 
 if __name__ == "__main__":

@@ -12,7 +12,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import IO, Any, Final
 
+from map3d import messages
 from map3d.errors import Corrupt, LimitExceeded, SubprocessDied, SubprocessStartFailed, SubprocessTimedOut
+from map3d.messages import load_message, message
 from map3d.subprocess.channel import Channel, Message
 from map3d.subprocess.limits import Limits
 
@@ -25,10 +27,10 @@ _ONE_THREAD: Final = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MALL
 
 @dataclass(frozen=True)
 class Failure:
-    """An exception that the subprocess raised and survived: its class name and text."""
+    """An exception that the subprocess raised and survived: its class name and message."""
 
     kind: str
-    message: str
+    message: messages.Message
 
 
 class Subprocess:
@@ -74,15 +76,15 @@ class Subprocess:
 
         Raises SubprocessStartFailed when the function raises, SubprocessDied when the subprocess ends, SubprocessTimedOut.
         """
-        message = self._receive(timeout_s)
-        if message is None:
+        answer = self._receive(timeout_s)
+        if answer is None:
             self.kill()
-            raise SubprocessTimedOut(f"the subprocess was not ready within {timeout_s:g} s{self._last_output()}")
-        if "ready" not in message.value:
+            raise SubprocessTimedOut(f"the subprocess was not ready within {timeout_s:g} s: {self._last_output()}".removesuffix(": "))
+        if "ready" not in answer.value:
             self.kill()
-            failure = message.value.get("error", {})
-            raise SubprocessStartFailed(f"the subprocess could not start: {failure.get('kind')}: {failure.get('message')}")
-        ready: dict[str, Any] = message.value["ready"]
+            failure = answer.value.get("error", {})
+            raise SubprocessStartFailed(f"the subprocess could not start: {failure.get('kind')}: {load_message(failure.get('message'))}")
+        ready: dict[str, Any] = answer.value["ready"]
         return ready
 
     def request(
@@ -112,16 +114,16 @@ class Subprocess:
             self._send({"request": request.value}, request.blobs, every_s=every_s, on_wait=on_wait)
             while True:
                 wait_s = every_s if end is None else min(every_s, max(end - time.monotonic(), 0.0))
-                message = self._receive(wait_s)
-                if message is None and end is not None and time.monotonic() >= end:
-                    raise SubprocessTimedOut(f"the subprocess did not respond within {wall_s:g} s")
-                if message is None or "progress" in message.value:
+                answer = self._receive(wait_s)
+                if answer is None and end is not None and time.monotonic() >= end:
+                    raise SubprocessTimedOut(message("subprocess-timed-out", seconds=wall_s))
+                if answer is None or "progress" in answer.value:
                     if on_progress is not None:
-                        on_progress(None if message is None else message.value["progress"])
-                elif "error" in message.value:
-                    return Failure(str(message.value["error"].get("kind")), str(message.value["error"].get("message")))
+                        on_progress(None if answer is None else answer.value["progress"])
+                elif "error" in answer.value:
+                    return Failure(str(answer.value["error"].get("kind")), load_message(answer.value["error"].get("message")))
                 else:
-                    return Message(message.value["response"], message.blobs)
+                    return Message(answer.value["response"], answer.blobs)
         except BaseException:
             self.kill()
             raise
@@ -160,16 +162,16 @@ class Subprocess:
 
     def _receive(self, timeout_s: float) -> Message | None:
         try:
-            message = self._channel.receive(timeout_s)
+            received = self._channel.receive(timeout_s)
         except EOFError as error:
             raise self._exit_error() from error
         except Corrupt as error:
             self.kill()
             raise SubprocessDied(f"the subprocess was killed: {error}") from error
-        if message is not None and not {"ready", "progress", "error", "response"} & set(message.value):
+        if received is not None and not {"ready", "progress", "error", "response"} & set(received.value):
             self.kill()
-            raise SubprocessDied(f"the subprocess was killed: message of unknown type with keys {sorted(message.value)[:5]}")
-        return message
+            raise SubprocessDied(f"the subprocess was killed: message of unknown type with keys {sorted(received.value)[:5]}")
+        return received
 
     def _exit_error(self) -> SubprocessDied | LimitExceeded:
         try:
@@ -179,17 +181,18 @@ class Subprocess:
             return SubprocessDied("the subprocess was killed: it closed its pipe without ending")
         output = self._last_output()
         if status == -signal.SIGXCPU:
-            return LimitExceeded(f"the subprocess reached its limit of {self.limits.cpu_s} s of CPU time")
+            return LimitExceeded(message("subprocess-over-cpu-limit", seconds=self.limits.cpu_s))
         memory, kind = (self.limits.address_space_bytes, "address space") if self.limits.data_bytes is None else (self.limits.data_bytes, "memory")
         if memory is not None and any(sign in output for sign in _OUT_OF_MEMORY):
-            return LimitExceeded(f"the subprocess reached its limit of {memory >> 20} MiB of {kind}{output}")
-        how = f"was ended by {_signal_name(-status)}" if status < 0 else f"ended with exit status {status}"
-        return SubprocessDied(f"the subprocess {how} before it responded{output}")
+            return LimitExceeded(f"the subprocess reached its limit of {memory >> 20} MiB of {kind}: {output}")
+        by_signal = status < 0
+        how = message("subprocess-ended-by-signal", signal=_signal_name(-status)) if by_signal else message("subprocess-exited", status=status)
+        return SubprocessDied(message("about", what=how, message=output) if output else how)
 
     def _last_output(self) -> str:
-        """Returns ": " and the last line that the subprocess printed, or an empty string."""
+        """Returns the last line that the subprocess printed, or an empty string."""
         lines = self.output_tail()
-        return f": {lines[-1].strip()}" if lines else ""
+        return lines[-1].strip() if lines else ""
 
 
 def _enlarge(pipe: int) -> None:

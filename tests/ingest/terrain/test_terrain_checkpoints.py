@@ -173,7 +173,7 @@ def kill(self, counts):
     if counts["done"] >= 5:
         os.kill(os.getpid(), 9)
 
-ImportProgress.text = kill
+ImportProgress.message = kill
 test.import_into(Path(sys.argv[1]), Path(sys.argv[2]))
 """
 
@@ -218,8 +218,8 @@ def test_progress_says_rate_and_remaining_time(monkeypatch: pytest.MonkeyPatch) 
     clock = iter((0.0, 1.0, 2.0, 63.0))
     monkeypatch.setattr("time.monotonic", lambda: next(clock))
     progress = ImportProgress()
-    assert progress.text({"done": 1000, "total": 5000}) == "1,000 of 5,000 tiles"
-    assert progress.text({"done": 1010, "total": 5000}) == "1,010 of 5,000 tiles, 10.0/s, 7 min left"
-    assert progress.text({"done": 1020, "total": 5000}) == "1,020 of 5,000 tiles, 10.0/s, 7 min left"
-    assert progress.text({"done": 1081, "total": 5000}) == "1,081 of 5,000 tiles, 1.0/s, 65 min left"
-    assert progress.text({"triangles": 50_000}) == "50,000 triangles"
+    assert str(progress.message({"done": 1000, "total": 5000})) == "1,000 of 5,000 tiles"
+    assert str(progress.message({"done": 1010, "total": 5000})) == "1,010 of 5,000 tiles, 10/s, 7 min left"
+    assert str(progress.message({"done": 1020, "total": 5000})) == "1,020 of 5,000 tiles, 10/s, 7 min left"
+    assert str(progress.message({"done": 1081, "total": 5000})) == "1,081 of 5,000 tiles, 1/s, 65 min left"
+    assert str(progress.message({"triangles": 50_000})) == "50,000 triangles"

@@ -27,6 +27,7 @@ from map3d.jobs.open_jobs import count_open, has_jobs_left
 from map3d.jobs.run_settings import RunSettings
 from map3d.jobs.run_statistics import RunStatistics
 from map3d.jobs.stop_request import StopRequest
+from map3d.messages import verbatim
 from map3d.tiles.track_stores import tiles_url
 
 TASKS_PER_THREAD: Final = 4
@@ -184,7 +185,7 @@ class _DaskPool:
         self._errors += 1
         if process not in self._reported_errors:
             self._reported_errors.add(process)
-            self._report(WorkerExited(process, error), on_event)
+            self._report(WorkerExited(process, verbatim(error)), on_event)
         if self._errors >= ERRORS_PER_WORKER * max(self._nodes.count, 1):
             self._end(dask_task.drain)
 

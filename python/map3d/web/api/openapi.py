@@ -8,7 +8,7 @@ from flask import request
 from werkzeug import Response
 
 from map3d import __version__
-from map3d.errors import BadName, NotFound
+from map3d.errors import BadName, Map3dError, NotFound
 from map3d.web.api.declare_route import PREFIX, ROUTES, ApiRoute
 from map3d.web.api.schemas import SCHEMAS, ref
 from map3d.web.http.access import current_caller
@@ -62,4 +62,7 @@ def problem_response(error: Exception, status: int, detail: str) -> Response:
     elif isinstance(error, NotFound) and request.authorization and current_caller().identity is not None:
         detail = without_host_folders(str(error))
     value = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail}
+    if isinstance(error, Map3dError) and error.message.code != "verbatim":
+        said = error.message.map_texts(without_host_folders)
+        value |= said.document if str(said) == detail else {}
     return Response(json.dumps(value) + "\n", status, mimetype=PROBLEM_TYPE)

@@ -35,6 +35,11 @@ def _array(items: Any, length: int | None = None, **more: Any) -> dict[str, Any]
     return {"type": "array", "items": items, **({} if length is None else {"minItems": length, "maxItems": length}), **more}
 
 
+def _message(name: str, about: str = "English text.") -> dict[str, Any]:
+    """Returns the members of a message: its text, its code and the values that the text names; only the text is always there."""
+    return {name: {**TEXT, "description": about}, f"{name}_code": TEXT, f"{name}_values": {"type": "object"}}
+
+
 def _page(name: str, item: str) -> dict[str, Any]:
     """Returns the schema of a page of a list."""
     rest = {**TEXT, "description": "Pass it as the parameter that begins the next page; absent on the last page."}
@@ -48,7 +53,7 @@ SCHEMAS: Final[dict[str, Schema]] = {
     "Problem": {
         "type": "object",
         "description": "An error, as in RFC 9457.",
-        "properties": {"type": TEXT, "title": TEXT, "status": {"type": "integer"}, "detail": TEXT},
+        "properties": {"type": TEXT, "title": TEXT, "status": {"type": "integer"}, "detail": TEXT, "code": TEXT, "values": {"type": "object"}},
         "required": ["type", "title", "status", "detail"],
     },
     "Crs": _object({"name": TEXT, "epsg": {"type": "integer"}, "vertical": TEXT}, "name"),
@@ -104,7 +109,7 @@ SCHEMAS: Final[dict[str, Schema]] = {
     "Jobs": _object(
         {"rendering": _NAME, "counts": _object(dict.fromkeys(State, COUNT), "*"), "complete": _FLAG}, "*", description="Blocks by state."
     ),
-    "Failure": _object({"track": TEXT, "block": TEXT, "kind": TEXT, "attempts": COUNT, "reason": TEXT}, "*"),
+    "Failure": _object({"track": TEXT, "block": TEXT, "kind": TEXT, "attempts": COUNT, **_message("reason")}, "track block kind attempts reason"),
     "Failures": _object({"failures": _array(ref("Failure")), "total": COUNT}, "*"),
     "Operation": _object(
         {
@@ -115,10 +120,10 @@ SCHEMAS: Final[dict[str, Schema]] = {
             "arguments": {"type": "object"},
             "state": {"type": "string", "enum": list(OperationState)},
             "cancelling": _FLAG,
-            "stage": TEXT,
+            **_message("stage"),
             "done": COUNT,
             "total": {**COUNT, "description": "0 if it is unknown."},
-            "message": {**TEXT, "description": "How the operation ended."},
+            **_message("message", "How the operation ended."),
             "asked_by": TEXT,
             "created": _TIME,
             "started": _TIME,
@@ -135,7 +140,7 @@ SCHEMAS: Final[dict[str, Schema]] = {
         "kind target",
     ),
     **{f"{kind.title()}Arguments": schema for kind, schema in ARGUMENTS.items()},
-    "LogLine": _object({"number": COUNT, "time": _TIME, "text": TEXT}, "*"),
+    "LogLine": _object({"number": COUNT, "time": _TIME, **_message("text")}, "*"),
     "Log": _object({"lines": _array(ref("LogLine")), "next": {**COUNT, "description": "Pass it as `after` for later lines."}}, "*"),
     "Scenes": _page("scenes", "Scene"),
     "Assets": _page("assets", "Asset"),

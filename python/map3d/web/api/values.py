@@ -6,6 +6,7 @@ from typing import Any
 
 from map3d.catalogue import AssetRecord, Job, LogLine, OperationRecord, RenderingRecord, SceneRecord
 from map3d.ingest.findings import report_document, skipped_count, warning_count
+from map3d.messages import Message
 from map3d.web.http.host_folders import values_without_host_folders, without_host_folders
 
 
@@ -49,7 +50,7 @@ def rendering_value(rendering: RenderingRecord) -> dict[str, Any]:
 
 
 def failure_value(job: Job) -> dict[str, Any]:
-    return {"track": job.track, "block": str(job.block), "kind": job.kind, "attempts": job.attempts, "reason": without_host_folders(job.reason or "")}
+    return {"track": job.track, "block": str(job.block), "kind": job.kind, "attempts": job.attempts, **_named("reason", job.reason)}
 
 
 def operation_value(operation: OperationRecord) -> dict[str, Any]:
@@ -58,15 +59,19 @@ def operation_value(operation: OperationRecord) -> dict[str, Any]:
     times = {name: getattr(operation, name) for name in ("created", "started", "ended")}
     return {
         **{name: getattr(operation, name) for name in names},
-        "stage": without_host_folders(operation.stage),
-        "message": without_host_folders(operation.message),
+        **_named("stage", operation.stage),
+        **_named("message", operation.message),
         "arguments": values_without_host_folders(operation.arguments),
         **{name: time_text(time) for name, time in times.items() if time is not None},
     }
 
 
 def line_value(line: LogLine) -> dict[str, Any]:
-    return {"number": line.number, "time": time_text(line.time), "text": without_host_folders(line.text)}
+    return {"number": line.number, "time": time_text(line.time), **_named("text", line.text)}
+
+
+def _named(name: str, message: Message | None) -> dict[str, Any]:
+    return {name: ""} if message is None else message.map_texts(without_host_folders).named(name)
 
 
 def time_text(time: datetime) -> str:

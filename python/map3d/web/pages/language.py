@@ -1,10 +1,12 @@
 """The language of a page."""
 
+from pathlib import Path
 from typing import Final
 
 from flask import request
 
-LANGUAGES: Final = ("en", "de")
+TRANSLATIONS: Final = Path(__file__).parents[1] / "translations"
+LANGUAGES: Final = ("en", *sorted(path.stem for path in TRANSLATIONS.glob("*.json")))
 
 
 def language() -> str:

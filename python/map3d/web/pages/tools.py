@@ -2,8 +2,7 @@
 
 import json
 from functools import cache
-from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from flask import Flask, g, request
 from markupsafe import Markup
@@ -13,9 +12,7 @@ from map3d.web.http.access import COOKIE, CSRF_FIELD, access, current_caller
 from map3d.web.http.host_folders import without_host_folders
 from map3d.web.http.session_cookie import set_session
 from map3d.web.pages.formats import FILTERS, number_or_text
-from map3d.web.pages.language import language
-
-_TRANSLATIONS: Final = Path(__file__).parents[1] / "translations"
+from map3d.web.pages.language import TRANSLATIONS, language
 
 
 def add_page_tools(app: Flask) -> None:
@@ -42,7 +39,7 @@ def translate(text: str, **values: Any) -> str:
 @cache
 def translations(name: str) -> dict[str, str]:
     """Returns English text → translation."""
-    loaded: dict[str, str] = json.loads((_TRANSLATIONS / f"{name}.json").read_text("utf-8"))
+    loaded: dict[str, str] = json.loads((TRANSLATIONS / f"{name}.json").read_text("utf-8"))
     return loaded
 
 

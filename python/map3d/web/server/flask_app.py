@@ -20,7 +20,7 @@ from map3d.web.server.error_pages import error_response
 from map3d.web.services.gis_documents import SERVICE_PREFIXES, VIEWS, tile_services
 from map3d.web.studio.account_routes import accounts
 from map3d.web.studio.operation_pages import operation_pages
-from map3d.web.studio.operation_sentences import operation_text
+from map3d.web.studio.operation_words import message_text
 from map3d.web.studio.rendering_pages import rendering_pages
 from map3d.web.studio.scene_pages import scene_pages
 from map3d.web.studio.shared import PREVIEWS
@@ -65,7 +65,7 @@ def create_flask_app(workspace: Workspace, settings: ServerSettings, access: Acc
         app.register_blueprint(blueprint)
     app.extensions[PREVIEWS] = PreviewPool(workspace)
     add_page_tools(app)
-    app.jinja_env.filters["operation_text"] = operation_text
+    app.jinja_env.filters["message_text"] = message_text
     app.register_error_handler(Exception, error_response)
     app.after_request(_make_redirect_relative)
     app.after_request(_add_security_headers)

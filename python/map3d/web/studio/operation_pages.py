@@ -8,9 +8,7 @@ from werkzeug import Response
 from map3d.errors import BadRequest
 from map3d.web.http.access import requires
 from map3d.web.http.current_app import catalogue
-from map3d.web.http.host_folders import without_host_folders
-from map3d.web.studio.operation_sentences import operation_text
-from map3d.web.studio.operation_words import show, show_all
+from map3d.web.studio.operation_words import message_text, show, show_all
 from map3d.web.studio.shared import ask, go_to, page
 
 operation_pages = Blueprint("operation_pages", __name__, url_prefix="/studio/operations")
@@ -29,7 +27,7 @@ def operations() -> Response:
 @requires("viewer")
 def operation(id: str) -> Response:
     shown = show(catalogue().operation(id))
-    log = [operation_text(without_host_folders(line.text)) for line in catalogue().operation_log(id)]
+    log = [message_text(line.text) for line in catalogue().operation_log(id)]
     return page("operation.html", operation=shown, log=log, running=shown.is_open)
 
 

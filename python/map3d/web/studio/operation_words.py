@@ -6,9 +6,10 @@ from typing import Final
 
 from map3d.catalogue import OperationRecord
 from map3d.catalogue.operation_records import REPEATABLE, UNENDED
+from map3d.messages import Message
 from map3d.web.http.host_folders import without_host_folders
+from map3d.web.pages.language import language
 from map3d.web.pages.tools import translate as _
-from map3d.web.studio.operation_sentences import operation_text
 
 N_: Final = str
 KINDS: Final = {"import": N_("Import"), "build": N_("Build"), "render": N_("Render"), "publish": N_("Publish"), "remove": N_("Remove")}
@@ -33,12 +34,19 @@ class ShownOperation:
 
     @property
     def lacks_crs(self) -> bool:
-        """Whether an import failed because its files do not name their coordinate system."""
-        return self.record.kind == "import" and self.can_retry and "--crs" in self.record.message and bool(self.record.arguments.get("files"))
+        """Whether an import failed for its coordinate systems, so that another one may help."""
+        said = self.record.message
+        is_crs = said is not None and not said.codes.isdisjoint(("crs-missing", "crs-unusable"))
+        return self.record.kind == "import" and self.can_retry and is_crs and bool(self.record.arguments.get("files"))
 
     @property
     def can_retry(self) -> bool:
         return self.record.state in REPEATABLE
+
+
+def message_text(message: Message | None) -> str:
+    """Returns a message in the language of the page, without the folders of the server's host."""
+    return "" if message is None else message.map_texts(without_host_folders).text(language())
 
 
 def show(operation: OperationRecord) -> ShownOperation:
@@ -46,7 +54,7 @@ def show(operation: OperationRecord) -> ShownOperation:
     state_text = _("Stopping") if operation.cancelling else _(STATES[state])
     percent = min(100, 100 * operation.done // operation.total) if operation.total and state == "running" else None
     said = operation.stage if state == "running" else operation.message
-    text = _("Starts when a worker is free.") if state == "waiting" else operation_text(without_host_folders(said))
+    text = _("Starts when a worker is free.") if state == "waiting" else message_text(said)
     return ShownOperation(operation.id, f"{_(KINDS[operation.kind])}: {operation.target}", state, state_text, text, percent, operation)
 
 
