@@ -249,10 +249,11 @@ def _crs_text(crs: SceneCrs | None) -> str | None:
 
 
 def _without_triangles(source: SourceDocument, report: Mapping[str, Any]) -> Message:
-    file, found = str(source.paths[0]), [item.line for item in findings(report) if item.skipped or item.reason.code == "nothing-at-lod"]
+    file, found = str(source.paths[0]), [item for item in findings(report) if item.skipped or item.reason.code == "nothing-at-lod"]
     if not found:
         return message("no-usable-triangle", file=file)
-    return message("no-usable-triangle-since", file=file, findings=reduce(lambda first, second: message("both", first=first, second=second), found))
+    said = [item.message for item in found] if len(found) > 1 else [found[0].line]
+    return message("no-usable-triangle-since", file=file, findings=reduce(lambda first, second: message("both", first=first, second=second), said))
 
 
 def _parser_error(source: SourceDocument, limits: Limits, error: SubprocessDied | LimitExceeded) -> ImportFailed | LimitExceeded:
