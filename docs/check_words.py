@@ -9,7 +9,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 WORDS = Path(__file__).with_name("words.txt")
 SKIPPED = {"docs/words.txt", "LICENSE", "viewer/LICENSE"}
-SUFFIXES = {".py", ".pyi", ".rs", ".ts", ".mts", ".mjs", ".js", ".css", ".html", ".md", ".toml", ".json", ".sh", ".txt", ".yml", ""}
+SUFFIXES = {".py", ".pyi", ".rs", ".ts", ".mts", ".mjs", ".js", ".css", ".html", ".md", ".toml", ".json", ".sh", ".sql", ".txt", ".yml", ""}
 
 
 def rules() -> Iterator[tuple[re.Pattern[str], str]]:

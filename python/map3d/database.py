@@ -1,6 +1,7 @@
 """SQLite files used by many threads and processes: one connection per thread, write-ahead log, BEGIN IMMEDIATE, busy timeout."""
 
 import os
+import re
 import sqlite3
 import threading
 from collections.abc import Callable, Iterator, Mapping
@@ -13,6 +14,13 @@ from map3d.errors import StoreError, UnknownVersion
 BUSY_TIMEOUT_S: Final = 60.0
 NOW: Final = "((julianday('now') - 2440587.5) * 86400.0)"
 """Seconds since 1970 on the database's clock, to the millisecond, as an SQL expression."""
+
+
+def read_statements(path: Path) -> dict[str, str]:
+    """Returns the statements of an SQL file by name; each follows a line `-- name` or `-- name: events`. `now_s()` stands for NOW."""
+    text = path.read_text(encoding="utf-8").replace("now_s()", NOW)
+    parts = re.split(r"^-- ([a-z_]+)(?:: [a-z, ]+)?\n", text, flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
 
 
 class Connections:

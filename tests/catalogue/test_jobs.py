@@ -9,7 +9,7 @@ import pytest
 
 from map3d.catalogue import Catalogue, Job, JobResult, Lease, PlannedJob, State
 from map3d.catalogue.sqlite import SqliteCatalogue
-from map3d.catalogue.sqlite_jobs import _LEASE
+from map3d.catalogue.sqlite_plan import SQL
 from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, TRANSITIONS, JobEvent
 from map3d.errors import StaleFence
 from map3d.messages import message, verbatim
@@ -346,7 +346,7 @@ def test_a_lease_in_sqlite_finds_its_job_in_an_index_without_sorting(tmp_path: P
     path = tmp_path / "catalogue.sqlite"
     SqliteCatalogue(path).close()
     with closing(sqlite3.connect(path)) as db:
-        steps = [row[3] for row in db.execute(f"EXPLAIN QUERY PLAN {_LEASE}", {"rendering": "r", "worker": "w", "lease_s": 1, "start": 5})]
+        steps = [row[3] for row in db.execute(f"EXPLAIN QUERY PLAN {SQL['lease']}", {"rendering": "r", "worker": "w", "lease_s": 1, "start": 5})]
     found = [step for step in steps if "job_next" in step]
     assert len(found) == 3
     assert any(step.endswith("z=? AND ground>?)") for step in found)

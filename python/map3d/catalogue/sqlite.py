@@ -21,6 +21,7 @@ from map3d.types import Layer, Vec3, check_name
 VERSION: Final = 8
 REMOVE_BATCH: Final = 20_000
 """Jobs that one transaction removes."""
+_REMOVE_JOBS: Final = "DELETE FROM job WHERE rowid IN (SELECT rowid FROM job WHERE rendering = ? LIMIT ?)"
 
 _REMOVED: Final = "CREATE TABLE removed_rendering(name TEXT PRIMARY KEY, content_version INTEGER NOT NULL)"
 
@@ -141,7 +142,7 @@ class SqliteCatalogue(SqliteOperations, SqliteAccounts):
             removed = db.execute("SELECT content_version FROM removed_rendering WHERE name = ?", (rendering.name,)).fetchone()
             version = max(rendering.content_version, removed[0] + 1 if removed else 0)
             row = codec.dump_rendering(replace(rendering, content_version=version))
-            if db.execute(f"INSERT OR IGNORE INTO rendering VALUES ({_marks(row)})", row).rowcount == 0:
+            if db.execute("INSERT OR IGNORE INTO rendering VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row).rowcount == 0:
                 raise AlreadyExists(f"rendering {rendering.name}: exists already; choose another name, or use --regrid to replace its frames")
 
     def rendering(self, name: str) -> RenderingRecord:
@@ -160,7 +161,7 @@ class SqliteCatalogue(SqliteOperations, SqliteAccounts):
             db.execute("DELETE FROM rendering WHERE name = ?", (rendering.name,))
             after = codec.with_versions(rendering, before.content_version + 1, before.announced_version)
             row = codec.dump_rendering(after)
-            db.execute(f"INSERT INTO rendering VALUES ({_marks(row)})", row)
+            db.execute("INSERT INTO rendering VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", row)
             return after
 
     def add_frames(self, name: str, frames: Sequence[PinnedFrame]) -> RenderingRecord:
@@ -186,12 +187,11 @@ class SqliteCatalogue(SqliteOperations, SqliteAccounts):
             db.execute("UPDATE rendering SET announced_version = max(announced_version, ?) WHERE name = ?", (version, name))
 
     def remove_rendering(self, name: str) -> None:
-        some_jobs = f"DELETE FROM job WHERE rowid IN (SELECT rowid FROM job WHERE rendering = ? LIMIT {REMOVE_BATCH})"
         removed = REMOVE_BATCH
         while removed == REMOVE_BATCH:
             with self._database.transaction() as db:
                 version = _rendering(db, name).content_version
-                removed = db.execute(some_jobs, (name,)).rowcount
+                removed = db.execute(_REMOVE_JOBS, (name, REMOVE_BATCH)).rowcount
                 if removed < REMOVE_BATCH:
                     db.execute("INSERT OR REPLACE INTO removed_rendering VALUES (?, ?)", (name, version))
                     db.execute("DELETE FROM rendering WHERE name = ?", (name,))
@@ -201,21 +201,16 @@ class SqliteCatalogue(SqliteOperations, SqliteAccounts):
 def _scene(db: sqlite3.Connection, name: str) -> SceneRecord:
     row = db.execute("SELECT * FROM scene WHERE name = ?", (name,)).fetchone()
     if row is None:
-        raise NotFound(f"no scene {name!r}; existing scenes: {_names(db, 'scene')}")
+        raise NotFound(f"no scene {name!r}; existing scenes: {_names(db, 'SELECT name FROM scene ORDER BY name LIMIT 21')}")
     return codec.load_scene(row)
 
 
 def _rendering(db: sqlite3.Connection, name: str) -> RenderingRecord:
     row = db.execute("SELECT * FROM rendering WHERE name = ?", (name,)).fetchone()
     if row is None:
-        raise NotFound(f"no rendering {name!r}; existing renderings: {_names(db, 'rendering')}")
+        raise NotFound(f"no rendering {name!r}; existing renderings: {_names(db, 'SELECT name FROM rendering ORDER BY name LIMIT 21')}")
     return codec.load_rendering(row)
 
 
-def _names(db: sqlite3.Connection, table: str) -> str:
-    names = [row[0] for row in db.execute(f"SELECT name FROM {table} ORDER BY name LIMIT 21")]
-    return codec.list_names(names)
-
-
-def _marks(row: Sequence[Any]) -> str:
-    return ", ".join("?" * len(row))
+def _names(db: sqlite3.Connection, query: str) -> str:
+    return codec.list_names([row[0] for row in db.execute(query)])

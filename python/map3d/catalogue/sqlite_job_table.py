@@ -1,7 +1,6 @@
-"""The table of jobs in SQLite: schema, expressions that several statements share, and the conversion of rows."""
+"""The table of jobs in SQLite: schema and conversion of rows; jobs.sql has the statements."""
 
 import sqlite3
-from collections.abc import Iterable
 from typing import Any, Final
 
 from map3d.catalogue.codec import dump_bits, load_bits
@@ -40,9 +39,6 @@ CREATE INDEX job_parent ON job(rendering, track, parent_z, parent_x, parent_y);
 
 RESULT: Final = ("version", "empty", "tiles", "base_tiles", "bytes", "seconds", "occupied")
 """Columns of a job's result."""
-AT: Final = "rendering = :rendering AND track = :track AND z = :z AND x = :x AND y = :y"
-ALL_BELOW_DONE: Final = f"""NOT EXISTS (SELECT 1 FROM job AS below WHERE below.rendering = job.rendering AND below.track = job.track
-  AND below.parent_z = job.z AND below.parent_x = job.x AND below.parent_y = job.y AND below.state <> '{State.DONE}')"""
 
 
 def place_of(rendering: str, track: str, block: BlockId) -> dict[str, Any]:
@@ -50,19 +46,14 @@ def place_of(rendering: str, track: str, block: BlockId) -> dict[str, Any]:
 
 
 def planned_row(rendering: str, job: PlannedJob) -> dict[str, Any]:
-    """Returns the row of a planned job without its fence. A reduce job waits until a sweep finds all blocks below it done."""
+    """Returns the row of a planned job without its state and fence. A reduce job waits until a sweep finds all blocks below it done."""
     above = job.parent or (None, None, None)
     row = {**place_of(rendering, job.track, job.block), "kind": job.kind, "morton": job.order, "key": job.key, "ground": job.ground}
-    row |= {"parent_z": above[0], "parent_x": above[1], "parent_y": above[2]}
-    return {**row, "state": State.TODO if job.kind == "base" else State.WAITING}
+    return row | {"parent_z": above[0], "parent_x": above[1], "parent_y": above[2]}
 
 
 def result_row(result: JobResult) -> dict[str, Any]:
     return {name: getattr(result, name) for name in RESULT[:-1]} | {"occupied": dump_bits(result.occupied)}
-
-
-def quoted(states: Iterable[State]) -> str:
-    return ", ".join(f"'{state}'" for state in states)
 
 
 def load_lease(row: sqlite3.Row) -> Lease:

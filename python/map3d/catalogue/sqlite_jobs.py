@@ -1,4 +1,4 @@
-"""Jobs in SQLite: every transition of states.py is one statement that checks the state it starts from. Times are on SQLite's clock."""
+"""Jobs in SQLite: every transition of states.py is one statement of jobs.sql that checks the state it starts from. Times are on SQLite's clock."""
 
 import sqlite3
 from collections.abc import Iterable, Iterator
@@ -7,8 +7,9 @@ from typing import Any, Final
 
 from map3d.catalogue import sqlite_plan
 from map3d.catalogue.records import Job, JobResult, Lease, PlanCounts, PlannedJob
-from map3d.catalogue.sqlite_job_table import AT, RESULT, load_job, load_lease, place_of, result_row
-from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, JobEvent, State, next_state
+from map3d.catalogue.sqlite_job_table import load_job, load_lease, place_of, result_row
+from map3d.catalogue.sqlite_plan import SQL
+from map3d.catalogue.states import MAX_ATTEMPTS, MAX_EXPIRIES, State
 from map3d.database import NOW, Database
 from map3d.errors import StaleFence
 from map3d.messages import Message, dump_text
@@ -18,39 +19,6 @@ PLAN_BATCH: Final = 5_000
 """Jobs that one transaction plans."""
 PAGE: Final = 2_000
 """Jobs that one query reads."""
-
-_AFTER_FAILURE: Final = f"CASE WHEN attempts >= {MAX_ATTEMPTS} THEN '{State.QUARANTINED}' ELSE '{next_state(State.LEASED, JobEvent.FAIL)}' END"
-_AFTER_EXPIRY: Final = f"CASE WHEN expiries + 1 >= {MAX_EXPIRIES} THEN '{State.QUARANTINED}' ELSE '{next_state(State.LEASED, JobEvent.EXPIRE)}' END"
-_EXPIRE: Final = f"""UPDATE job SET state = {_AFTER_EXPIRY}, attempts = attempts - 1, expiries = expiries + 1, worker = NULL, expires = NULL,
-  reason = json_object('code', 'lease-expired', 'values', json_object('count', expiries + 1, 'worker', worker))
-  WHERE state = '{State.LEASED}'"""
-_EXPIRE_OVERDUE: Final = f"{_EXPIRE} AND expires < {NOW}"
-_NEXT: Final = f"""SELECT {{columns}} FROM job WHERE rendering = :rendering AND state = '{State.TODO}'
-  ORDER BY attempts + expiries, z, ground, track, morton LIMIT 1"""
-_WITH_VERSION: Final = "RETURNING *, (SELECT content_version FROM rendering WHERE name = rendering) AS content_version"
-_LEASE: Final = f"""UPDATE job SET state = '{next_state(State.TODO, JobEvent.LEASE)}', attempts = attempts + 1, fence = fence + 1, worker = :worker,
-  leased = {NOW}, expires = {NOW} + :lease_s
-  WHERE rowid = coalesce(
-    (SELECT rowid FROM job WHERE rendering = :rendering AND state = '{State.TODO}' AND ground >= :start
-      AND (attempts + expiries, z) = ({_NEXT.format(columns="attempts + expiries, z")}) ORDER BY ground, track, morton LIMIT 1),
-    ({_NEXT.format(columns="rowid")}))
-  {_WITH_VERSION}"""
-_LEASE_BLOCK: Final = f"""UPDATE job SET state = '{next_state(State.TODO, JobEvent.LEASE)}', attempts = attempts + 1, fence = fence + 1,
-  worker = :worker, leased = {NOW}, expires = {NOW} + :lease_s WHERE {AT} AND state = '{State.TODO}' {_WITH_VERSION}"""
-_EVICT: Final = f"""UPDATE job SET state = '{next_state(State.DONE, JobEvent.EVICT)}', attempts = 1, expiries = 0, fence = fence + 1,
-  worker = :worker, leased = {NOW}, expires = {NOW} + :lease_s WHERE {AT} AND state = '{State.DONE}' AND kind = 'base'
-  AND EXISTS (SELECT 1 FROM job_count AS other WHERE other.rendering = :rendering AND other.state <> '{State.DONE}' AND other.jobs > 0)
-  {_WITH_VERSION}"""
-_HELD: Final = f"{AT} AND state = '{State.LEASED}' AND fence = :fence AND worker = :worker AND expires >= {NOW}"
-_ORDER: Final = "ORDER BY track, z, morton, x, y"
-_PAGE: Final = f"""SELECT * FROM job WHERE rendering = :rendering AND {{after}}
-  AND (:state IS NULL OR state = :state) {_ORDER} LIMIT {PAGE}"""
-_PAGE_OF_ALL: Final = _PAGE.format(after="(track, z, morton, x, y) > (:track, :z, :morton, :x, :y)")
-_PAGE_OF_TRACK: Final = _PAGE.format(after="track = :track AND (z, morton, x, y) > (:z, :morton, :x, :y)")
-_BELOW: Final = """SELECT * FROM job WHERE rendering = :rendering AND track = :track
-  AND parent_z = :z AND parent_x = :x AND parent_y = :y ORDER BY morton"""
-_IN_STATE: Final = f"""SELECT * FROM job INDEXED BY job_next WHERE rendering = :rendering AND state = :state
-  AND (:track IS NULL OR track = :track) {_ORDER}"""
 
 
 class SqliteJobs:
@@ -96,19 +64,19 @@ class SqliteJobs:
 
     def lease(self, rendering: str, worker: str, start: int = 0) -> Lease | None:
         with self._database.transaction() as db:
-            db.execute(_EXPIRE_OVERDUE)
-            row = db.execute(_LEASE, {"rendering": rendering, "worker": worker, "lease_s": self.lease_s, "start": start}).fetchone()
+            db.execute(SQL["expire_overdue"], {"max_expiries": MAX_EXPIRIES})
+            row = db.execute(SQL["lease"], {"rendering": rendering, "worker": worker, "lease_s": self.lease_s, "start": start}).fetchone()
         return None if row is None else load_lease(row)
 
     def lease_block(self, rendering: str, worker: str, track: str, block: BlockId) -> Lease | None:
         with self._database.transaction() as db:
-            db.execute(_EXPIRE_OVERDUE)
-            row = db.execute(_LEASE_BLOCK, self._lease_values(rendering, worker, track, block)).fetchone()
+            db.execute(SQL["expire_overdue"], {"max_expiries": MAX_EXPIRIES})
+            row = db.execute(SQL["lease_block"], self._lease_values(rendering, worker, track, block)).fetchone()
         return None if row is None else load_lease(row)
 
     def evict(self, rendering: str, worker: str, track: str, block: BlockId) -> Lease | None:
         with self._database.transaction() as db:
-            row = db.execute(_EVICT, self._lease_values(rendering, worker, track, block)).fetchone()
+            row = db.execute(SQL["evict"], self._lease_values(rendering, worker, track, block)).fetchone()
             if row is not None:
                 sqlite_plan.wait_above_evicted(db, row)
         return None if row is None else load_lease(row)
@@ -118,12 +86,11 @@ class SqliteJobs:
 
     def heartbeat(self, lease: Lease) -> None:
         with self._database.transaction() as db:
-            _move(db, lease, f"expires = {NOW} + :lease_s", lease_s=self.lease_s)
+            _move(db, lease, "heartbeat", {"lease_s": self.lease_s})
 
     def done(self, lease: Lease, result: JobResult) -> None:
-        change = f"state = '{next_state(State.LEASED, JobEvent.DONE)}', worker = NULL, expires = NULL, ended = {NOW}, reason = NULL, "
         with self._database.transaction() as db:
-            row = _move(db, lease, change + ", ".join(f"{name} = :{name}" for name in RESULT), **result_row(result))
+            row = _move(db, lease, "done", result_row(result))
             self._open_above(db, row)
 
     def _open_above(self, db: sqlite3.Connection, row: sqlite3.Row) -> None:
@@ -131,39 +98,40 @@ class SqliteJobs:
 
     def fail(self, lease: Lease, reason: Message) -> State:
         with self._database.transaction() as db:
-            row = _move(db, lease, f"state = {_AFTER_FAILURE}, worker = NULL, expires = NULL, reason = :reason", reason=dump_text(reason))
+            row = _move(db, lease, "fail", {"max_attempts": MAX_ATTEMPTS, "reason": dump_text(reason)})
         return State(row["state"])
 
     def release(self, lease: Lease) -> None:
         with self._database.transaction() as db:
-            _move(db, lease, f"state = '{next_state(State.LEASED, JobEvent.RELEASE)}', attempts = attempts - 1, worker = NULL, expires = NULL")
+            _move(db, lease, "release", {})
 
     def expire(self, rendering: str, workers: Iterable[str]) -> int:
         with self._database.transaction() as db:
-            return sum(db.execute(f"{_EXPIRE} AND rendering = ? AND worker = ?", (rendering, worker)).rowcount for worker in set(workers))
+            values = [{"rendering": rendering, "worker": worker, "max_expiries": MAX_EXPIRIES} for worker in set(workers)]
+            return sum(db.execute(SQL["expire_worker"], each).rowcount for each in values)
 
     # -- queries ----------------------------------------------------------------------------------------------------------------
 
     def jobs(self, rendering: str, track: str | None = None, state: State | None = None) -> Iterator[Job]:
         if state is not None and self._counts(rendering).get(state, 0) <= PAGE:
-            yield from map(load_job, self._rows(_IN_STATE, {"rendering": rendering, "track": track, "state": state}))
+            yield from map(load_job, self._rows("in_state", {"rendering": rendering, "track": track, "state": state}))
             return
-        page = _PAGE_OF_ALL if track is None else _PAGE_OF_TRACK
+        page = "page" if track is None else "page_of_track"
         after: dict[str, Any] = {"track": track or "", "z": -1, "morton": 0, "x": 0, "y": 0}
-        while rows := self._rows(page, {"rendering": rendering, "state": state, **after}):
+        while rows := self._rows(page, {"rendering": rendering, "state": state, "page": PAGE, **after}):
             yield from map(load_job, rows)
             after = {name: rows[-1][name] for name in after}
 
     def job(self, rendering: str, track: str, block: BlockId) -> Job | None:
-        rows = self._rows(f"SELECT * FROM job WHERE {AT}", place_of(rendering, track, block))
+        rows = self._rows("job", place_of(rendering, track, block))
         return load_job(rows[0]) if rows else None
 
     def jobs_below(self, rendering: str, track: str, block: BlockId) -> list[Job]:
-        return [load_job(row) for row in self._rows(_BELOW, place_of(rendering, track, block))]
+        return [load_job(row) for row in self._rows("below", place_of(rendering, track, block))]
 
-    def _rows(self, query: str, values: dict[str, Any]) -> list[sqlite3.Row]:
+    def _rows(self, statement: str, values: dict[str, Any]) -> list[sqlite3.Row]:
         with self._database.reading() as db:
-            return db.execute(query, values).fetchall()
+            return db.execute(SQL[statement], values).fetchall()
 
     def clock_s(self) -> float:
         with self._database.reading() as db:
@@ -171,7 +139,7 @@ class SqliteJobs:
 
     def has_open_jobs(self, rendering: str) -> bool:
         with self._database.reading() as db:
-            return sqlite_plan.any_open(db, rendering, (State.TODO, State.LEASED))
+            return db.execute(SQL["any_leasable"], {"rendering": rendering}).fetchone() is not None
 
     def count_jobs(self, rendering: str) -> dict[State, int]:
         with self._database.reading() as db:
@@ -180,13 +148,13 @@ class SqliteJobs:
         return {state: found.get(state, 0) for state in State}
 
     def _counts(self, rendering: str) -> dict[str, int]:
-        return {row["state"]: row["jobs"] for row in self._rows("SELECT state, jobs FROM job_count WHERE rendering = :name", {"name": rendering})}
+        return {row["state"]: row["jobs"] for row in self._rows("counts", {"rendering": rendering})}
 
 
-def _move(db: sqlite3.Connection, lease: Lease, change: str, **values: Any) -> sqlite3.Row:
-    """Moves a leased job to another state and returns it; raises StaleFence when the lease is no longer held."""
+def _move(db: sqlite3.Connection, lease: Lease, statement: str, values: dict[str, Any]) -> sqlite3.Row:
+    """Executes a statement on a leased job and returns the job; raises StaleFence when the lease is no longer held."""
     place = {**place_of(lease.rendering, lease.track, lease.block), "fence": lease.fence, "worker": lease.worker}
-    row: sqlite3.Row | None = db.execute(f"UPDATE job SET {change} WHERE {_HELD} RETURNING *", {**place, **values}).fetchone()
+    row: sqlite3.Row | None = db.execute(SQL[statement], {**place, **values}).fetchone()
     if row is None:
         raise StaleFence(
             f"job {lease.track} {lease.block}: the lease of {lease.worker} (fence {lease.fence}) is no longer held; {_holder(db, place)}"
@@ -195,7 +163,7 @@ def _move(db: sqlite3.Connection, lease: Lease, change: str, **values: Any) -> s
 
 
 def _holder(db: sqlite3.Connection, place: dict[str, Any]) -> str:
-    row = db.execute(f"SELECT state, fence, worker FROM job WHERE {AT}", place).fetchone()
+    row = db.execute(SQL["job"], place).fetchone()
     if row is None:
         return "the job no longer exists"
     worker = f", leased by {row['worker']}" if row["worker"] else ""

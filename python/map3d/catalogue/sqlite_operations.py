@@ -1,17 +1,18 @@
-"""Operations in SQLite: every change is one transaction that checks the state it starts from. Times are on SQLite's clock."""
+"""Operations in SQLite (operations.sql): every change is one transaction that checks the state it starts from. Times are on SQLite's clock."""
 
 import json
 import sqlite3
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any, Final
 
 from map3d.catalogue import operation_records as rules
 from map3d.catalogue.operation_contract import LOG_PAGE
-from map3d.catalogue.operation_records import ENDED, REPEATABLE, UNENDED, LogLine, NewOperation, OperationLease, OperationRecord, OperationState
+from map3d.catalogue.operation_records import LogLine, NewOperation, OperationLease, OperationRecord, OperationState
 from map3d.catalogue.sqlite_jobs import SqliteJobs
 from map3d.catalogue.states import MAX_EXPIRIES
-from map3d.database import NOW
+from map3d.database import read_statements
 from map3d.errors import NotFound, StaleFence
 from map3d.messages import Message, dump_text, load_text, verbatim
 
@@ -28,17 +29,7 @@ CREATE TABLE operation_log(operation INTEGER NOT NULL, number INTEGER NOT NULL, 
 """
 """The unique index keeps two operations of one scene from running at the same time."""
 
-_EXPIRE: Final = f"""UPDATE operation SET worker = NULL, expires = NULL, fence = fence + 1, expiries = expiries + 1,
-  ended = iif(cancelling OR expiries + 1 >= {MAX_EXPIRIES}, {NOW}, NULL), message = CASE WHEN cancelling THEN '{rules.CANCELLED_MESSAGE}'
-    WHEN expiries + 1 >= {MAX_EXPIRIES} THEN '{rules.expiry_message(MAX_EXPIRIES)}' ELSE message END,
-  state = CASE WHEN cancelling THEN '{OperationState.CANCELLED}' WHEN expiries + 1 >= {MAX_EXPIRIES} THEN '{OperationState.FAILED}'
-    ELSE '{OperationState.WAITING}' END, cancelling = 0 WHERE state = '{OperationState.RUNNING}'"""
-_LEASE: Final = f"""UPDATE operation SET state = '{OperationState.RUNNING}', worker = ?, fence = fence + 1, expires = {NOW} + ?,
-  started = coalesce(started, {NOW}) WHERE number = (SELECT min(number) FROM operation AS waiting WHERE state = '{OperationState.WAITING}'
-    AND NOT EXISTS (SELECT 1 FROM operation AS running WHERE running.scene = waiting.scene AND running.state = '{OperationState.RUNNING}'))
-  RETURNING *"""
-_HELD: Final = f"number = :number AND state = '{OperationState.RUNNING}' AND fence = :fence AND expires >= {NOW}"
-_AGAIN: Final = "worker = NULL, expires = NULL, cancelling = 0"
+_SQL: Final = read_statements(Path(__file__).with_name("operations.sql"))
 
 
 class SqliteOperations(SqliteJobs):
@@ -48,10 +39,9 @@ class SqliteOperations(SqliteJobs):
 
     def create_operation(self, kind: str, target: str, arguments: Mapping[str, Any], asked_by: str) -> OperationRecord:
         new = NewOperation(kind, target, arguments, asked_by)
-        insert = f"""INSERT INTO operation(kind, target, scene, arguments, state, asked_by, created)
-          VALUES (?, ?, ?, ?, '{OperationState.WAITING}', ?, {NOW}) RETURNING *"""
+        values = {"kind": kind, "target": target, "arguments": new.arguments_json, "asked_by": asked_by}
         with self._database.transaction() as db:
-            row = db.execute(insert, (kind, target, _scene_of(db, new), new.arguments_json, asked_by)).fetchone()
+            row = db.execute(_SQL["create"], {**values, "scene": _scene_of(db, new)}).fetchone()
             _prune(db)
             return _load(row)
 
@@ -68,97 +58,91 @@ class SqliteOperations(SqliteJobs):
         scene: str | None = None,
         before: str | None = None,
     ) -> list[OperationRecord]:
-        query = f"""SELECT * FROM operation WHERE (:target IS NULL OR target = :target) AND (:scene IS NULL OR scene = :scene)
-          AND (:before IS NULL OR number < :before) AND state IN ({_quoted(OperationState if states is None else states)})
-          ORDER BY number DESC LIMIT :limit"""
         number = None if before is None else rules.operation_number(before)
-        return [_load(row) for row in self._rows(query, {"target": target, "scene": scene, "before": number, "limit": limit})]
+        values = {"target": target, "scene": scene, "before": number, "limit": limit, "states": None if states is None else json.dumps(states)}
+        with self._database.reading() as db:
+            return [_load(row) for row in db.execute(_SQL["operations"], values)]
 
     def cancel_operation(self, id: str) -> OperationRecord:
         with self._database.transaction() as db:
-            number = _row(db, id)["number"]
-            db.execute(f"{_EXPIRE} AND number = ? AND expires < {NOW}", (number,))
-            change = f"state = '{OperationState.CANCELLED}', ended = {NOW}, message = '{rules.CANCELLED_MESSAGE}'"
-            db.execute(f"UPDATE operation SET {change} WHERE number = ? AND state = '{OperationState.WAITING}'", (number,))
-            db.execute(f"UPDATE operation SET cancelling = 1 WHERE number = ? AND state = '{OperationState.RUNNING}'", (number,))
+            place = {"number": _row(db, id)["number"], "cancelled": rules.CANCELLED_MESSAGE}
+            _expire(db, number=place["number"])
+            db.execute(_SQL["cancel_waiting"], place)
+            db.execute(_SQL["cancel_running"], place)
             found = _load(_row(db, id))
         if found.state not in (OperationState.RUNNING, OperationState.CANCELLED):
             raise rules.uncancellable(found)
         return found
 
     def retry_operation(self, id: str) -> OperationRecord:
-        change = f"{_AGAIN}, expiries = 0, stage = '', done = 0, total = 0, message = '', started = NULL, ended = NULL"
         with self._database.transaction() as db:
             before = _load(_row(db, id))
-            if before.state not in REPEATABLE:
+            if db.execute(_SQL["retry"], {"number": int(id)}).rowcount == 0:
                 raise rules.unretryable(before)
-            db.execute(f"UPDATE operation SET state = '{OperationState.WAITING}', {change} WHERE number = ?", (int(id),))
             return _load(_row(db, id))
 
     # -- doing ------------------------------------------------------------------------------------------------------------------
 
     def lease_operation(self, worker: str) -> OperationLease | None:
         """Takes the write lock only when an operation waits or runs."""
-        if not self._rows(f"SELECT 1 FROM operation WHERE state IN ({_quoted(UNENDED)}) LIMIT 1", {}):
-            return None
+        with self._database.reading() as db:
+            if db.execute(_SQL["any_unended"]).fetchone() is None:
+                return None
         with self._database.transaction() as db:
-            db.execute(f"{_EXPIRE} AND expires < {NOW}")
-            row = db.execute(_LEASE, (worker, self.lease_s)).fetchone()
+            _expire(db)
+            row = db.execute(_SQL["lease"], {"worker": worker, "lease_s": self.lease_s}).fetchone()
         return None if row is None else OperationLease(_load(row), worker, row["fence"])
 
     def heartbeat_operation(self, lease: OperationLease, stage: Message, done: int, total: int) -> bool:
-        change = f"expires = {NOW} + :lease_s, stage = :stage, done = :done, total = :total"
+        values = {**_place(lease), "lease_s": self.lease_s, "stage": dump_text(stage), "done": done, "total": total}
         with self._database.transaction() as db:
-            values = {**_place(lease), "lease_s": self.lease_s, "stage": dump_text(stage), "done": done, "total": total}
-            row = db.execute(f"UPDATE operation SET {change} WHERE {_HELD} RETURNING cancelling", values).fetchone()
+            row = db.execute(_SQL["heartbeat"], values).fetchone()
         return row is not None and not row["cancelling"]
 
     def append_log(self, lease: OperationLease, lines: Sequence[Message]) -> None:
         texts, half = rules.log_texts(lines), rules.MAX_LOG_LINES // 2
         with self._database.transaction() as db:
             place = _place(lease)
-            row = db.execute(f"UPDATE operation SET lines = lines + :lines WHERE {_HELD} RETURNING lines", {**place, "lines": len(texts)}).fetchone()
+            row = db.execute(_SQL["count_lines"], {**place, "lines": len(texts)}).fetchone()
             if row is None:
                 raise _stale(lease)
-            first = row["lines"] - len(texts) + 1
-            numbered = [(place["number"], number, text) for number, text in enumerate(texts, first)]
-            db.executemany(f"INSERT INTO operation_log VALUES (?, ?, {NOW}, ?)", numbered)
-            removed = (place["number"], half, row["lines"] - half)
-            db.execute("DELETE FROM operation_log WHERE operation = ? AND number > ? AND number <= ?", removed)
+            number, total = place["number"], row["lines"]
+            first = total - len(texts) + 1
+            db.executemany(_SQL["append_line"], [{"operation": number, "number": k, "text": text} for k, text in enumerate(texts, first)])
+            db.execute(_SQL["remove_lines"], {"operation": number, "after": half, "until": total - half})
 
     def operation_log(self, id: str, after: int = 0, limit: int = LOG_PAGE) -> list[LogLine]:
-        query = "SELECT * FROM operation_log WHERE operation = ? AND number > ? ORDER BY number LIMIT ?"
         with self._database.reading() as db:
-            rows = db.execute(query, (_row(db, id)["number"], after, limit)).fetchall()
+            rows = db.execute(_SQL["log"], {"number": _row(db, id)["number"], "after": after, "limit": limit}).fetchall()
         return rules.with_gaps(
             [LogLine(row["number"], datetime.fromtimestamp(row["time"], UTC), load_text(row["text"]) or verbatim("")) for row in rows], after
         )
 
     def end_operation(self, lease: OperationLease, state: OperationState, message: Message | None = None) -> None:
-        change = f"state = :state, message = :message, ended = {NOW}, {_AGAIN}"
+        values = {**_place(lease), "state": OperationState(state), "message": dump_text(message)}
         with self._database.transaction() as db:
-            values = {**_place(lease), "state": OperationState(state), "message": dump_text(message)}
-            if db.execute(f"UPDATE operation SET {change} WHERE {_HELD}", values).rowcount == 0:
-                ended = "SELECT 1 FROM operation WHERE number = :number AND state = :state AND fence = :fence"
-                if db.execute(ended, values).fetchone() is None:
-                    raise _stale(lease)
+            if db.execute(_SQL["end"], values).rowcount == 0 and db.execute(_SQL["has_ended"], values).fetchone() is None:
+                raise _stale(lease)
 
     def release_operation(self, lease: OperationLease) -> None:
-        state = f"iif(cancelling, '{OperationState.CANCELLED}', '{OperationState.WAITING}')"
-        change = f"state = {state}, ended = iif(cancelling, {NOW}, NULL), message = iif(cancelling, '{rules.CANCELLED_MESSAGE}', message), {_AGAIN}"
         with self._database.transaction() as db:
-            if db.execute(f"UPDATE operation SET {change} WHERE {_HELD}", _place(lease)).rowcount == 0:
+            if db.execute(_SQL["release"], {**_place(lease), "cancelled": rules.CANCELLED_MESSAGE}).rowcount == 0:
                 raise _stale(lease)
 
     def expire_operations(self, workers: Iterable[str]) -> int:
         with self._database.transaction() as db:
-            return sum(db.execute(f"{_EXPIRE} AND worker = ?", (worker,)).rowcount for worker in set(workers))
+            return sum(_expire(db, worker=worker) for worker in set(workers))
+
+
+def _expire(db: sqlite3.Connection, number: int | None = None, worker: str | None = None) -> int:
+    """Expires the leases of a worker, or all that are overdue; of one operation, or of any. Returns their number."""
+    messages = {"cancelled": rules.CANCELLED_MESSAGE, "expired": rules.expiry_message(MAX_EXPIRIES)}
+    return db.execute(_SQL["expire"], {"number": number, "worker": worker, "max_expiries": MAX_EXPIRIES, **messages}).rowcount
 
 
 def _scene_of(db: sqlite3.Connection, new: NewOperation) -> str:
     """Returns the scene of the target. Raises NotFound."""
-    query = "SELECT scene FROM rendering WHERE name = ?" if new.is_on_rendering else "SELECT name FROM scene WHERE name = ?"
-    row = db.execute(query, (new.target,)).fetchone()
+    row = db.execute(_SQL["scene_of_rendering" if new.is_on_rendering else "scene"], {"target": new.target}).fetchone()
     if row is None:
         raise NotFound(f"no {'rendering' if new.is_on_rendering else 'scene'} {new.target!r}")
     return str(row[0])
@@ -166,14 +150,13 @@ def _scene_of(db: sqlite3.Connection, new: NewOperation) -> str:
 
 def _prune(db: sqlite3.Connection) -> None:
     """Removes all but the newest ended operations, and their logs."""
-    oldest = f"SELECT number FROM operation WHERE state IN ({_quoted(ENDED)}) ORDER BY number DESC LIMIT -1 OFFSET ?"
-    for (number,) in db.execute(oldest, (rules.MAX_ENDED,)).fetchall():
-        db.execute("DELETE FROM operation_log WHERE operation = ?", (number,))
-        db.execute("DELETE FROM operation WHERE number = ?", (number,))
+    oldest = [dict(row) for row in db.execute(_SQL["too_many_ended"], {"kept": rules.MAX_ENDED})]
+    db.executemany(_SQL["remove_log"], oldest)
+    db.executemany(_SQL["remove"], oldest)
 
 
 def _row(db: sqlite3.Connection, id: str) -> sqlite3.Row:
-    row: sqlite3.Row | None = db.execute("SELECT * FROM operation WHERE number = ?", (rules.operation_number(id),)).fetchone()
+    row: sqlite3.Row | None = db.execute(_SQL["operation"], {"number": rules.operation_number(id)}).fetchone()
     if row is None:
         raise NotFound(f"no operation {id!r}; map3d operations lists them")
     return row
@@ -201,10 +184,6 @@ def _time(seconds: float | None) -> datetime | None:
 
 def _place(lease: OperationLease) -> dict[str, Any]:
     return {"number": int(lease.operation.id), "fence": lease.fence}
-
-
-def _quoted(states: Iterable[OperationState]) -> str:
-    return ", ".join(f"'{OperationState(state)}'" for state in states) or "NULL"
 
 
 def _stale(lease: OperationLease) -> StaleFence:
