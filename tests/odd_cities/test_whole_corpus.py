@@ -33,7 +33,7 @@ SAID = (
     r"no-label\.gml.*the file does not name its CRS; name it with --crs",
     r"town\.json.*CityJSON; convert it to CityGML",
     r"points\.las.*a LAS point cloud",
-    r"axes swapped, so the file is read as longitude, latitude.*swapped.*near Munich, Germany",
+    r"axes of the file are swapped, so it is read as longitude, latitude.*near Munich, Germany",
     r"Textures not found: 1\..*lost\.png",
     r"The file breaks off; what comes before is kept\.\W*(Example: )?cut",
     r"not in UTF-8 as it claims; other bytes are read as Windows-1252.*latin-1",
