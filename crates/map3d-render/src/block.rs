@@ -107,6 +107,9 @@ pub fn build_block(frame: &Frame, root: Tile, source: &mut dyn TileSource) -> Re
 }
 
 /// The source of a block's deepest tiles. A back end of the tracer is a source; reduction, encoding and seams are above it, the same for all.
+///
+/// `build_block` asks for each tile once, in Morton order, and calls one method at a time. A G-buffer has the arrays of the frame's layers and the tile's
+/// full size; `None` means that no pixel has a surface. Equal tiles have equal bytes, whichever tiles are asked for together. An error ends the block.
 pub trait TileSource {
     /// The level of the tiles that the source yields.
     fn level(&self) -> u8;

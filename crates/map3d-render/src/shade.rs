@@ -1,5 +1,14 @@
 //! Resolve and shading: each (pixel, surface) pair is shaded once, at the centroid of the samples that the surface covers in the pixel. Neighbouring pixels
 //! of a row that show one surface are shaded together.
+//!
+//! The contract of `Shader::shade_subtile`:
+//!
+//! * It takes a `VisBuf` and the place of its first pixel in a G-buffer, and fills the arrays that the G-buffer has; the others are not computed.
+//! * Id, normal and depth are those of sample 0, the pixel's centre. Colour is the mean over the `SampleSet` of the surfaces' colours at their centroids.
+//! * Pixels without a surface keep their values: the caller clears the arrays.
+//! * Colours have no light; `LightTracer` adds shadows and ambient occlusion at the `fragments` of the sub-tile.
+//! * The result depends on the `VisBuf` and the textures alone. The order in which surfaces are shaded, by texture, does not change it.
+//! * It fails if a material or texture cannot be read.
 
 use std::ops::Range;
 
@@ -108,12 +117,15 @@ impl Shader {
 
     /// Shades a sub-tile into the arrays of the G-buffer; `corner` (left, top) is the sub-tile's first pixel there.
     pub fn shade_subtile(&mut self, vis: &VisBuf, textures: &TextureCache, g: &mut GBuffer, corner: (usize, usize)) -> Result<()> {
+        // Forget the last sub-tile
         self.surfaces.clear();
         self.fragments.clear();
         self.runs.clear();
         self.edges.clear();
         self.surface_of_slot.clear();
         self.surface_of_slot.resize(vis.slot_count(), NOT_PREPARED);
+
+        // Find what each pixel shows, then shade it
         let mut target = SubtileTarget { vis, textures, width: g.width as usize, g: g.surface_arrays(), corner };
         let done = self.split_rows(&mut target).and_then(|()| self.shade_surfaces(&mut target));
         self.materials.finish_subtile();
@@ -191,8 +203,11 @@ impl Shader {
     fn shade_surfaces(&mut self, target: &mut SubtileTarget) -> Result<()> {
         let has_color = !target.g.color.is_empty();
         let Self { surfaces, materials, runs, order, edges, fragments, .. } = self;
+        // Sort runs and edge samples by surface
         order.sort(surfaces.len(), runs.iter().map(|run| run.surface));
         edges.sort(surfaces.len());
+
+        // Shade each surface
         for (number, surface) in surfaces.iter().enumerate() {
             for run in order.of(number) {
                 shade_run(surface, runs[*run as usize], target, materials)?;
@@ -201,6 +216,8 @@ impl Shader {
                 edges.shade(number, surface, materials, target.textures, &mut fragments.fragments)?;
             }
         }
+
+        // Average the edge samples of each pixel
         if has_color {
             edges.resolve(self.samples.bits, target.g.color);
         }

@@ -59,10 +59,13 @@ pub fn build(boxes: &[Aabb]) -> Tree {
     if boxes.is_empty() {
         return Tree::default();
     }
+
+    // Build a binary tree, then begin with its root
     let binary = BinaryTree::build(boxes);
     let mut tree = Tree { order: Vec::with_capacity(boxes.len()), ..Tree::default() };
     tree.nodes.push(empty_node());
-    // Depth first, so that a subtree is contiguous in the file.
+
+    // Collapse it depth first, so that a subtree is contiguous in the file
     let mut stack = vec![(0u32, 0u32)];
     while let Some((from, to)) = stack.pop() {
         let children = eight_children(&binary, from);

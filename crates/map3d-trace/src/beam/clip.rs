@@ -27,10 +27,15 @@ pub struct ViewClip {
 impl ViewClip {
     /// Returns the space between a camera's near and far distance, within a local box. `objects`: sorted ids.
     pub fn new(camera: &Camera, view: &Projection, cut: Option<&Box3>, objects: Option<Arc<[u32]>>) -> Self {
+        // Clip at near and far distance
         let forward = camera.axes.forward;
         let distance = dot(forward, camera.position);
         let mut planes = vec![half_space(forward, -(distance + camera.near_m)), half_space(scale(forward, -1.0), distance + camera.far_m)];
+
+        // Clip far beside the image
         planes.extend(guards(camera, view));
+
+        // Clip at the box
         for axis in 0..3 {
             let Some(cut) = cut else { break };
             let unit = |sign: f64| {
@@ -58,8 +63,11 @@ impl ViewClip {
         let (center, half) = (bounds.center(), bounds.half_extents());
         let mut planes = Vec::new();
         for plane in &self.planes {
+            // Project the box onto the plane's normal
             let reach = (0..3).map(|k| plane[k].abs() * half[k]).sum::<f64>() + MARGIN;
             let middle = distance(plane, center);
+
+            // Drop a part outside, and planes that contain all of it
             if middle < -reach {
                 return None;
             }
@@ -77,10 +85,13 @@ fn half_space(normal: Vec3, constant: f64) -> HalfSpace {
 
 /// Returns half-spaces that reach `GUARD_PX` beyond the image.
 fn guards(camera: &Camera, view: &Projection) -> Vec<HalfSpace> {
+    // Enlarge the window
     let window = camera.window;
     let margin = camera.pixel().map(|side| side * GUARD_PX);
     let (left, right) = (window.left - margin[0], window.right + margin[0]);
     let (bottom, top) = (window.bottom - margin[1], window.top + margin[1]);
+
+    // Put a plane through each of its edges
     let flip = |plane: HalfSpace| plane.map(|c| -c);
     match (camera.kind, view) {
         (CameraKind::Perspective, Projection::Perspective(p)) => vec![p.beside(left), flip(p.beside(right)), p.above(bottom), flip(p.above(top))],
@@ -93,6 +104,7 @@ fn guards(camera: &Camera, view: &Projection) -> Vec<HalfSpace> {
     }
 }
 
+/// Returns the signed distance of a point times the length of the plane's normal; positive inside.
 #[inline(always)]
 fn distance(plane: &HalfSpace, p: Vec3) -> f64 {
     plane[0] * p[0] + plane[1] * p[1] + plane[2] * p[2] + plane[3]
@@ -145,6 +157,7 @@ impl Polygon {
         &self.corners[..self.count]
     }
 
+    /// Returns the part in a half-space, by the algorithm of Sutherland and Hodgman.
     fn cut(&self, plane: &HalfSpace) -> Self {
         let mut out = Self { corners: [[0.0; 3]; CORNERS_MAX], count: 0 };
         let mut push = |p: Vec3| {
@@ -156,9 +169,11 @@ impl Polygon {
         for k in 0..self.count {
             let (a, b) = (self.corners[k], self.corners[(k + 1) % self.count]);
             let (da, db) = (distance(plane, a), distance(plane, b));
+            // Keep a corner inside
             if da >= 0.0 {
                 push(a);
             }
+            // Add the point where the edge crosses the plane
             match (da >= 0.0, db >= 0.0) {
                 (true, false) => push(crossing(a, da, b, db)),
                 (false, true) => push(crossing(b, db, a, da)),

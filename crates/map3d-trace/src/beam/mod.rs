@@ -1,4 +1,13 @@
 //! Beams: all samples of a sub-tile at once through the BVHs of all parts that it overlaps, front to back.
+//!
+//! The contract of `BeamTracer::trace`, which every back end that replaces it fulfils:
+//!
+//! * It takes a square of `SUBTILE_PX`² pixels, 16 samples each (spec/pyramid.md §4), and a `Cutout` that says which points of textures are transparent.
+//! * It returns a `VisBuf`: for each sample the surface with the least depth key. Surfaces with equal keys are ordered by class rank, object id and
+//!   triangle number, never by the order of traversal, so that neighbouring sub-tiles agree along their border.
+//! * A slot stands for one triangle; slots are valid until the next call.
+//! * The result depends on scene, view, clip and position alone: not on the instruction set, the thread or earlier calls.
+//! * It opens the chunk of a part only if the part can still win a sample, and fails only if a chunk cannot be read.
 
 mod child_boxes;
 mod clip;
@@ -107,9 +116,12 @@ impl<'s> BeamTracer<'s> {
     /// Opens a part's chunk only if it can still win a sample.
     fn trace_part(&mut self, hit: &PartHit, cutout: &dyn Cutout) -> Result<()> {
         let VisBuf { samples, triangles, parts, view, corner_px } = &mut self.result;
+        // Skip a part behind all samples
         if !samples.can_win::<Scalar>(hit.least_key, hit.groups) {
             return Ok(());
         }
+
+        // Find the planes that cut the part
         let clip = match &self.clip {
             None => None,
             Some(clip) => match clip.for_part(&self.scene.parts()[hit.part as usize].bounds) {
@@ -117,10 +129,14 @@ impl<'s> BeamTracer<'s> {
                 Some(clip) => Some(clip).filter(|clip| !clip.is_trivial()),
             },
         };
+
+        // Open the chunk
         parts.push(LoadedPart::load(self.scene, hit.part)?);
         let part_index = parts.len() - 1;
         let (part, number, clip, stack) = (&parts[part_index], part_index as u32, clip.as_ref(), &mut self.stack);
         let projection = SubtileProjection { view, corner_px: *corner_px };
+
+        // Traverse its BVH with depth keys of the view's projection
         match view {
             Projection::Parallel(_) => {
                 let rasterizer = Rasterizer { samples, triangles, planes: &mut self.planes.parallel, cutout };
