@@ -65,10 +65,19 @@ def test_a_hash_takes_32_mib(accounts: Accounts) -> None:
 
 
 def test_unknown_names_cost_a_hash_too(accounts: Accounts, monkeypatch: pytest.MonkeyPatch) -> None:
-    checked: list[str] = []
-    monkeypatch.setattr(passwords, "check_password_hash", lambda stored, _: bool(checked.append(stored)))
+    passwords._dummy_hash()
+    hashed: list[str] = []
+    monkeypatch.setattr(passwords, "_make_hash", lambda password, *_: hashed.append(password) or "")
     accounts.check_password("nobody", PASSWORD)
-    assert len(checked) == 1
+    assert hashed == [PASSWORD]
+
+
+def test_hashes_of_earlier_versions_are_read() -> None:
+    digest = "bd96e2a23f100ed831e487ee3032348fbd194fa445b64558f0f9473380fc58db672382c22e88baf7af0c7ee214a8d8e730c030e6dc514e793e6245c2eb8d1d55"
+    stored = f"scrypt:256:8:1$CjvvcxKWPkkCk2GX${digest}"
+    assert passwords.is_password("correct horse battery", stored)
+    assert not passwords.is_password("correct horse batterY", stored)
+    assert passwords.hash_password("correct horse battery").startswith(f"{passwords.METHOD}$")
 
 
 def test_token_stands_for_its_user_with_the_lesser_role(accounts: Accounts) -> None:

@@ -4,47 +4,44 @@ import re
 from html import unescape
 
 import pytest
-from flask import Flask
 
-from map3d.web.http.access import GUARD, PUBLIC_QUERY, SAFE_METHODS, SIGN_IN, public_query, requires
-from map3d.web.server.flask_app import GuardedFlask
+from map3d.web.http.access import SAFE_METHODS
+from map3d.web.http.guards import GUARD, SIGN_IN, requires
+from map3d.web.http.routes import Routes
+from map3d.web.server.asgi_app import App
 from tests.web.accounts import PASSWORD, add_token, add_user, csrf_of, sign_in
 
-PUBLIC_QUERIES: set[str] = set()
-"""Endpoints whose POST changes nothing, because a standard sends its queries so. Each new one is a deliberate line here."""
 OWN_ACCOUNT = {"accounts.sign_out", "accounts.change_password", "accounts.add_token", "accounts.remove_token"}
 """Writes that a viewer may do: only to the own account."""
 
 
-def writes(app: Flask):
+def writes(app: App):
     """Yields (rule, method, guard) of every route that accepts another method than GET, HEAD and OPTIONS."""
-    for rule in app.url_map.iter_rules():
-        for method in sorted(rule.methods - SAFE_METHODS):
-            yield rule, method, getattr(app.view_functions[rule.endpoint], GUARD, None)
+    for rule in app.views.rules:
+        if rule.method not in SAFE_METHODS:
+            yield rule, rule.method, getattr(rule.view, GUARD, None)
 
 
 def path_of(rule):
-    return re.sub(r"<[^>]*>", "x", rule.rule)
+    return re.sub(r"{[^}]*}", "x", rule.path)
 
 
 def test_every_write_has_a_guard(client):
-    listed = list(writes(client.app.flask))
-    assert {"accounts.send_sign_in", "accounts.add_token"} <= {rule.endpoint for rule, _, _ in listed}
+    listed = list(writes(client.app))
+    assert {"accounts.send_sign_in", "accounts.add_token"} <= {rule.name for rule, _, _ in listed}
     for rule, method, guard in listed:
-        if rule.endpoint == "accounts.send_sign_in":
+        if rule.name == "accounts.send_sign_in":
             assert guard == SIGN_IN
-        elif rule.endpoint in PUBLIC_QUERIES:
-            assert guard == PUBLIC_QUERY
         else:
-            assert guard == ("viewer" if rule.endpoint in OWN_ACCOUNT else "editor"), f"{method} {rule.rule}: {rule.endpoint}"
+            assert guard == ("viewer" if rule.name in OWN_ACCOUNT else "editor"), f"{method} {rule.path}: {rule.name}"
 
 
 def test_every_write_is_refused_to_visitors_and_to_invalid_tokens(client):
-    for rule, method, guard in writes(client.app.flask):
-        if guard not in (PUBLIC_QUERY, SIGN_IN):
+    for rule, method, guard in writes(client.app):
+        if guard != SIGN_IN:
             for headers in ({}, {"authorization": "Bearer map3d_wrong"}, {"authorization": "Basic eDp5"}, {"cookie": "map3d_session=forged"}):
                 response = client.request(method, path_of(rule), headers=headers)
-                assert response.status_code == 401, f"{method} {rule.rule}"
+                assert response.status_code == 401, f"{method} {rule.path}"
                 assert response.headers["www-authenticate"].startswith("Bearer")
                 assert response.headers["cache-control"] == "no-store"
 
@@ -52,30 +49,30 @@ def test_every_write_is_refused_to_visitors_and_to_invalid_tokens(client):
 def test_every_write_of_an_editor_is_refused_to_viewers(client, workspace):
     add_user(workspace, role="viewer")
     token = add_token(workspace, role="editor")
-    for rule, method, guard in writes(client.app.flask):
+    for rule, method, guard in writes(client.app):
         if guard == "editor":
-            assert client.request(method, path_of(rule), headers={"authorization": f"Bearer {token}"}).status_code == 403, f"{method} {rule.rule}"
+            assert client.request(method, path_of(rule), headers={"authorization": f"Bearer {token}"}).status_code == 403, f"{method} {rule.path}"
 
 
 def test_every_write_by_cookie_needs_the_csrf_value(client, workspace):
     add_user(workspace)
     sign_in(client)
-    for rule, method, guard in writes(client.app.flask):
-        if guard not in (PUBLIC_QUERY,):
-            for data in ({}, {"csrf": ""}, {"csrf": "x" * 32}):
-                assert client.request(method, path_of(rule), data=data).status_code == 403, f"{method} {rule.rule}"
+    for rule, method, _ in writes(client.app):
+        for data in ({}, {"csrf": ""}, {"csrf": "x" * 32}):
+            assert client.request(method, path_of(rule), data=data).status_code == 403, f"{method} {rule.path}"
 
 
 def test_unguarded_write_does_not_start():
-    app = GuardedFlask("test")
-    for register in (app.post, app.put, app.delete, app.patch):
-        with pytest.raises(TypeError, match="without a guard"):
-            register("/x")(lambda: "x")
+    routes = Routes("test")
     with pytest.raises(TypeError, match="without a guard"):
-        app.add_url_rule("/x", "x", lambda: "x", methods=["GET", "post"])
-    app.get("/a")(lambda: "a")
-    app.post("/b", endpoint="b")(requires("editor")(lambda: "b"))
-    app.post("/c", endpoint="c")(public_query(lambda: "c"))
+        routes.post("/x")(lambda: "x")
+    for method in ("POST", "PUT", "DELETE", "PATCH"):
+        with pytest.raises(TypeError, match="without a guard"):
+            routes.add(method, "/x", lambda: "x")
+    assert list(routes) == []
+    routes.get("/a")(lambda: "a")
+    routes.post("/b")(requires("editor")(lambda: "b"))
+    assert [rule.path for rule in routes] == ["/a", "/b"]
 
 
 def test_sign_in_leads_back_to_the_page_that_asked(client, workspace):
@@ -100,7 +97,7 @@ def test_cookie_is_secure_behind_https(client, workspace):
     assert "Secure" not in client.get("/sign-in").headers["set-cookie"]
     from dataclasses import replace
 
-    client.app.flask.config["SETTINGS"] = replace(client.app.flask.config["SETTINGS"], public_url="https://example.org/maps")
+    client.app.site.settings = replace(client.app.site.settings, public_url="https://example.org/maps")
     client._client.cookies.clear()
     cookie = client.get("/sign-in").headers["set-cookie"].split("; ")
     assert {"Secure", "Path=/maps/"} <= set(cookie)
@@ -145,13 +142,13 @@ def test_sign_ins_are_limited(client, workspace):
 def test_only_a_proxy_on_this_host_names_the_clients_address(client, workspace):
     """Otherwise a client could choose another address for each attempt."""
     add_user(workspace)
-    app = client.app.flask.test_client()
 
     def attempt(number, remote):
-        value = csrf_of(app.get("/sign-in"))
+        client.come_from(remote)
+        value = csrf_of(client.get("/sign-in"))
         headers = {"X-Forwarded-For": f"198.51.100.7, 10.0.0.{number}"}
         data = {"csrf": value, "name": f"user{number}", "password": "x"}
-        return app.post("/sign-in", data=data, headers=headers, environ_base={"REMOTE_ADDR": remote}).status_code
+        return client.request("POST", "/sign-in", data=data, headers=headers).status_code
 
     assert [attempt(number, "203.0.113.5") for number in range(31)] == [403] * 30 + [429]
     assert [attempt(number, "127.0.0.1") for number in range(100, 131)] == [403] * 31

@@ -199,3 +199,10 @@ def test_an_early_answer_ends_its_request(scheduled):
     request = Request({"type": "http", "path": "/known"})
     assert scheduled(request) == []
     assert ([message["type"] for message in request.sent], request.ended) == (["start", "body"], 1)
+
+
+def test_a_granian_without_the_hook_serves_without_early_answers(monkeypatch, caplog):
+    monkeypatch.delattr(_futures, "_cbsched_aioschedule")
+    answer_early(lambda _scope: None)
+    assert not hasattr(_futures, "_cbsched_aioschedule")
+    assert "granian has no _cbsched_aioschedule" in caplog.text

@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import pytest
-from flask import Flask
 
 from map3d.catalogue import OperationState, PlannedJob, Workspace
 from map3d.catalogue.states import MAX_ATTEMPTS
@@ -17,7 +16,7 @@ from map3d.uploads import Uploads
 from map3d.web.http.host_folders import without_host_folders
 from map3d.web.server.asgi_app import create_app
 from tests.web.accounts import add_token, add_user
-from tests.web.conftest import Client
+from tests.web.conftest import Client, asked_of
 from tests.web.test_api import Api
 
 ENDED = (OperationState.DONE, OperationState.FAILED, OperationState.CANCELLED)
@@ -37,10 +36,8 @@ ENDED = (OperationState.DONE, OperationState.FAILED, OperationState.CANCELLED)
         ("textures/wall.png is missing; 3/4 of all, km/h, EPSG:25832", "textures/wall.png is missing; 3/4 of all, km/h, EPSG:25832"),
     ],
 )
-def test_folders_of_the_host_are_left_out(workspace: Workspace, text: str, shown: str) -> None:
-    app = Flask(__name__)
-    app.config["WORKSPACE"] = workspace
-    with app.app_context():
+def test_folders_of_the_host_are_left_out(client: Client, workspace: Workspace, text: str, shown: str) -> None:
+    with asked_of(client.app):
         assert without_host_folders(text.replace("{root}", str(workspace.root.absolute()))) == shown
 
 

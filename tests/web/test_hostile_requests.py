@@ -9,7 +9,7 @@ from map3d.errors import NotFound
 from map3d.publish.page_head import MAX_DESCRIPTION, MAX_TITLE
 from map3d.tiles import viewer_files
 from map3d.types import TileId
-from map3d.web.server.asgi_app import FLASK_THREADS
+from map3d.web.server.views import THREADS
 from tests.web.workspaces import ZMAX, tile_bytes
 
 URL = f"/tiles/tea/0-45/color/{ZMAX}/7/7"
@@ -139,7 +139,7 @@ def test_a_deleted_catalogue_is_not_created_again(client, workspace):
     assert client.get("/healthz").status_code == 200
     for path in workspace.root.glob("catalogue.sqlite*"):
         path.unlink()
-    for _ in range(2 * FLASK_THREADS):
+    for _ in range(2 * THREADS):
         assert client.get("/renderings").status_code == 503
         assert client.get("/healthz").status_code == 503
     assert not workspace.catalogue_path.exists()

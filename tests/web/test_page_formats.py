@@ -18,6 +18,7 @@ from map3d.catalogue.records import LOCAL_CRS_NAME
 from map3d.operations.request_operation import request_operation
 from map3d.types import BlockId
 from map3d.web import create_app
+from map3d.web.pages import tools
 from map3d.web.pages.language import LANGUAGES
 from tests.web.accounts import add_token, add_user
 from tests.web.conftest import Client
@@ -147,10 +148,11 @@ PATHS = (
 )
 
 
-def test_no_page_prints_a_number_without_a_filter(pages):
+def test_no_page_prints_a_number_without_a_filter(pages, monkeypatch):
     """Marks every number that a template prints as it is; only attributes and scripts may have such."""
-    client, get = pages
-    client.app.flask.jinja_env.finalize = lambda value: f"⟦{value}⟧" if isinstance(value, int | float) and not isinstance(value, bool) else value
+    _, get = pages
+    marked = tools.TEMPLATES.overlay(finalize=lambda value: f"⟦{value}⟧" if isinstance(value, int | float) and not isinstance(value, bool) else value)
+    monkeypatch.setattr(tools, "TEMPLATES", marked)
     assert "⟦" in get("/studio/scenes/town/renderings/new") + get("/studio/renderings/tea"), "attributes have plain numbers"
     for path in PATHS:
         text = re.sub(r"<[^>]*>", " ", client_text(get, path))

@@ -11,7 +11,7 @@ import segno
 from PIL import Image
 
 from map3d.tiles import viewer_files
-from map3d.web.server.flask_app import CONTENT_SECURITY_POLICY
+from map3d.web.http.headers import CONTENT_SECURITY_POLICY
 from map3d.web.tiles import picture_routes
 from tests.web.workspaces import make_workspace
 

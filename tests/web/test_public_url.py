@@ -9,7 +9,7 @@ from map3d.tiles import viewer_files
 from map3d.web import create_app
 from map3d.web.http.public_url import public_url
 from map3d.web.http.settings import ServerSettings, check_public_url, settings_from_environment
-from tests.web.conftest import Client
+from tests.web.conftest import Client, asked_of
 
 HOSTILE = {"host": "evil.example", "x-forwarded-host": "evil.example", "forwarded": "host=evil.example"}
 
@@ -55,13 +55,13 @@ def test_the_public_url_is_configured(configured, tmp_path, monkeypatch):
 
 
 def test_absolute_urls_begin_with_the_public_url(configured):
-    with configured.app.flask.test_request_context("/", headers=HOSTILE):
+    with asked_of(configured.app, HOSTILE):
         assert public_url() == "https://maps.example/city"
         assert public_url("ogc/collections") == public_url("/ogc/collections") == "https://maps.example/city/ogc/collections"
 
 
 def test_without_a_public_url_the_host_of_the_request_is_used(client):
-    with client.app.flask.test_request_context("/", headers={"host": "localhost:8080"}):
+    with asked_of(client.app, {"host": "localhost:8080"}):
         assert public_url() == "http://localhost:8080"
         assert public_url("ogc/") == "http://localhost:8080/ogc/"
 

@@ -9,7 +9,7 @@ from urllib.parse import urljoin
 
 import pytest
 from PIL import Image
-from werkzeug.datastructures import MultiDict
+from starlette.datastructures import ImmutableMultiDict
 
 from map3d.catalogue import OperationState, Workspace
 from map3d.messages import verbatim
@@ -223,7 +223,7 @@ def test_preview_of_a_scene_that_is_not_built(studio):
 
 
 def test_previews_have_a_bounded_queue(town, monkeypatch):
-    pool = town.client.app.flask.extensions["map3d.previews"]
+    pool = town.client.app.site.previews
     while pool._room.acquire(blocking=False):
         pass
     response, _ = preview(town, pitch=33)
@@ -279,12 +279,12 @@ def test_the_form_stores_data_tiles_in_place_of_png_layers(town):
     ("chosen", "stored"), [(["color"], ["color"]), (["id", "sun"], ["data", "sun"]), ([], ["color", "data"]), (["data"], ["color", "data"])]
 )
 def test_only_chosen_data_is_stored(chosen, stored):
-    form = read_form(MultiDict([("data", "tile"), *(("layer", kind) for kind in chosen)]))
+    form = read_form(ImmutableMultiDict([("data", "tile"), *(("layer", kind) for kind in chosen)]))
     assert list(form.stored_layers) == stored
 
 
 def test_an_unknown_data_is_the_default():
-    assert read_form(MultiDict([("data", "zip")])).data == read_form(MultiDict()).data
+    assert read_form(ImmutableMultiDict([("data", "zip")])).data == read_form(ImmutableMultiDict()).data
 
 
 def test_rendering_from_the_form_to_the_map_and_away(town):

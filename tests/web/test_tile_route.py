@@ -3,12 +3,12 @@ import shutil
 
 import pytest
 
+from map3d.errors import StoreError
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.sqlite_store import SqliteTileStore
 from map3d.tiles.tile_store import content_hash
 from map3d.types import BlockId, TileId
 from map3d.web.http import open_stores
-from map3d.web.tiles import tile_route
 from tests.web.workspaces import ADDED, LAYERS, OCCUPIED, ZMAX, add_pass, every_tile, put_block, rendering_record, store_shape, tile_bytes
 
 TILE = TileId(ZMAX, 7, 7)
@@ -174,7 +174,7 @@ def test_a_removed_rendering_is_gone(client, workspace, monkeypatch):
 
 def test_errors_contain_no_paths_and_are_not_cached(client, workspace, monkeypatch):
     def fail(*_):
-        raise tile_route.status_of.__globals__["StoreError"](f"{workspace.root}: disk I/O error")
+        raise StoreError(f"{workspace.root}: disk I/O error")
 
     with monkeypatch.context() as broken:
         broken.setattr(SqliteTileStore, "get_tile", fail)

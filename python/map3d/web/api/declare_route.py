@@ -1,4 +1,4 @@
-"""Declares routes of the REST API: one declaration makes the Flask route and its part of the OpenAPI document, so that they cannot differ."""
+"""Declares routes of the REST API: one declaration makes the route and its part of the OpenAPI document, so that they cannot differ."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -6,26 +6,24 @@ from dataclasses import dataclass
 from functools import cache, wraps
 from typing import Any, Final
 
-from flask import Blueprint, Response, jsonify, request
+from starlette.responses import Response
 
 from map3d.catalogue import Role
 from map3d.errors import BadRequest
 from map3d.operations.arguments import place_of
 from map3d.web.api.schemas import SCHEMAS, ref
-from map3d.web.http.access import requires
+from map3d.web.http.current import request
+from map3d.web.http.guards import requires
+from map3d.web.http.responses import json_value
+from map3d.web.http.routes import Routes
 
 PREFIX: Final = "/api/v1"
 MAX_BODY_BYTES: Final = 1 << 20
+"""More than forms have: an import of many files names each."""
 MAX_PAGE: Final = 1_000
 _WHOLE: Final = re.compile(r"0|[1-9][0-9]{0,14}", re.ASCII)
 
-api: Final = Blueprint("api", __name__, url_prefix=PREFIX)
-
-
-@api.before_request
-def allow_larger_bodies() -> None:
-    """Allows larger bodies than forms have: an import of many files names each."""
-    request.max_content_length = MAX_BODY_BYTES
+api: Final = Routes("api", PREFIX)
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ class ApiRoute:
 
     @property
     def parameters(self) -> list[str]:
-        return re.findall(r"<(\w+)>", self.path)
+        return re.findall(r"{(\w+)}", self.path)
 
 
 ROUTES: Final[list[ApiRoute]] = []
@@ -83,14 +81,9 @@ def route(method: str, path: str, about: str, answer: str, *, role: Role | None 
                 given["body"] = _body(declared.body)
             found = view(**given)
             value, headers = found if isinstance(found, tuple) else (found, {})
-            response = jsonify(value)
-            response.status_code = declared.status
-            response.headers["Cache-Control"] = "no-store"
-            response.headers.update(headers)
-            return response
+            return json_value(value, declared.status, headers)
 
-        guarded = answered if role is None else requires(role)(answered)
-        api.add_url_rule(path, view.__name__, guarded, methods=[method])
+        api.add(method, path, answered if role is None else requires(role)(answered), MAX_BODY_BYTES)
         return view
 
     return register
@@ -98,13 +91,13 @@ def route(method: str, path: str, about: str, answer: str, *, role: Role | None 
 
 def _query(declared: ApiRoute) -> dict[str, Any]:
     """Raises BadRequest for unknown, repeated and malformed parameters."""
-    known = {query.name: query for query in declared.query}
-    for name in request.args:
+    known, asked = {query.name: query for query in declared.query}, request().query_params
+    for name in asked:
         if name not in known:
             raise BadRequest(f"unknown parameter {name[:64]!r}; known are {', '.join(known) or 'none'}")
-        if len(request.args.getlist(name)) > 1:
+        if len(asked.getlist(name)) > 1:
             raise BadRequest(f"parameter {name} is given twice")
-    return {name: _parse(query, request.args.get(name)) for name, query in known.items()}
+    return {name: _parse(query, asked.get(name)) for name, query in known.items()}
 
 
 def _parse(query: Query, text: str | None) -> Any:
@@ -117,10 +110,7 @@ def _parse(query: Query, text: str | None) -> Any:
 
 def _body(schema: str) -> Any:
     """Returns the JSON body. Raises BadRequest."""
-    try:
-        value = request.get_json(silent=True)
-    except RecursionError:
-        value = None
+    value = request().json()
     if not isinstance(value, Mapping):
         raise BadRequest("expected a JSON object with Content-Type: application/json")
     error = next(_validator(schema).iter_errors(value), None)

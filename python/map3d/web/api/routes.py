@@ -14,8 +14,8 @@ from map3d.requests.json_values import from_json
 from map3d.web.api.declare_route import LIMIT, MAX_PAGE, Query, api, route
 from map3d.web.api.openapi import openapi_document
 from map3d.web.api.values import asset_report_value, asset_value, failure_value, line_value, operation_value, rendering_value, scene_value
-from map3d.web.http.access import require
-from map3d.web.http.current_app import catalogue, workspace
+from map3d.web.http.current import catalogue, workspace
+from map3d.web.http.guards import require
 
 PAGE: Final = 100
 ESTIMATE_AGAIN_S: Final = 10
@@ -45,17 +45,17 @@ def new_scene(body: dict[str, Any]) -> Any:
     return scene_value(record), {"Location": f"scenes/{record.name}"}
 
 
-@route("GET", "/scenes/<scene>", "Returns a scene.", "Scene", role="viewer")
+@route("GET", "/scenes/{scene}", "Returns a scene.", "Scene", role="viewer")
 def scene(scene: str) -> dict[str, Any]:
     return scene_value(catalogue().scene(scene))
 
 
-@route("GET", "/scenes/<scene>/assets", "Lists the imported files of a scene.", "Assets", role="viewer", query=(LIMIT, _AFTER))
+@route("GET", "/scenes/{scene}/assets", "Lists the imported files of a scene.", "Assets", role="viewer", query=(LIMIT, _AFTER))
 def assets(scene: str, limit: int | None, after: str | None) -> dict[str, Any]:
     return _page("assets", [asset_value(record) for record in catalogue().assets(scene)], limit, after)
 
 
-@route("GET", "/scenes/<scene>/assets/<asset>", "Returns the import report of a file.", "AssetReport", role="viewer")
+@route("GET", "/scenes/{scene}/assets/{asset}", "Returns the import report of a file.", "AssetReport", role="viewer")
 def asset(scene: str, asset: str) -> dict[str, Any]:
     for record in catalogue().assets(scene):
         if record.name == asset:
@@ -77,14 +77,14 @@ def new_rendering(body: dict[str, Any]) -> Any:
     return rendering_value(record), {"Location": f"renderings/{record.name}"}
 
 
-@route("GET", "/renderings/<rendering>", "Returns a rendering.", "Rendering")
+@route("GET", "/renderings/{rendering}", "Returns a rendering.", "Rendering")
 def rendering(rendering: str) -> dict[str, Any]:
     return rendering_value(catalogue().rendering(rendering))
 
 
 @route(
     "GET",
-    "/renderings/<rendering>/estimate",
+    "/renderings/{rendering}/estimate",
     "Estimates tiles, bytes and time before a render. Renders some blocks as a sample, which takes seconds; one estimate at a time.",
     "Estimate",
     role="viewer",
@@ -100,13 +100,13 @@ def estimate(rendering: str, workers: int | None) -> dict[str, Any]:
         _estimating.release()
 
 
-@route("GET", "/renderings/<rendering>/jobs", "Counts the blocks of a rendering by state.", "Jobs", role="viewer")
+@route("GET", "/renderings/{rendering}/jobs", "Counts the blocks of a rendering by state.", "Jobs", role="viewer")
 def jobs(rendering: str) -> dict[str, Any]:
     counts = catalogue().count_jobs(rendering)
     return {"rendering": rendering, "counts": counts, "complete": counts[State.DONE] == sum(counts.values()) > 0}
 
 
-@route("GET", "/renderings/<rendering>/failures", "Lists blocks in quarantine with the reasons.", "Failures", role="viewer", query=(LIMIT,))
+@route("GET", "/renderings/{rendering}/failures", "Lists blocks in quarantine with the reasons.", "Failures", role="viewer", query=(LIMIT,))
 def failures(rendering: str, limit: int | None) -> dict[str, Any]:
     total = catalogue().count_jobs(rendering)[State.QUARANTINED]
     found = catalogue().jobs(rendering, state=State.QUARANTINED)
@@ -143,14 +143,14 @@ def new_operation(body: dict[str, Any]) -> Any:
     return operation_value(record), {"Location": f"operations/{record.id}"}
 
 
-@route("GET", "/operations/<id>", "Returns an operation with its progress.", "Operation", role="viewer")
+@route("GET", "/operations/{id}", "Returns an operation with its progress.", "Operation", role="viewer")
 def operation(id: str) -> dict[str, Any]:
     return operation_value(catalogue().operation(id))
 
 
 @route(
     "GET",
-    "/operations/<id>/log",
+    "/operations/{id}/log",
     "Returns lines of an operation's log.",
     "Log",
     role="viewer",
@@ -161,12 +161,12 @@ def operation_log(id: str, limit: int | None, after: int | None) -> dict[str, An
     return {"lines": [line_value(line) for line in lines], "next": lines[-1].number if lines else after or 0}
 
 
-@route("POST", "/operations/<id>/cancel", "Cancels an operation; a running one stops within seconds.", "Operation", role="editor", status=202)
+@route("POST", "/operations/{id}/cancel", "Cancels an operation; a running one stops within seconds.", "Operation", role="editor", status=202)
 def cancel_operation(id: str) -> dict[str, Any]:
     return operation_value(catalogue().cancel_operation(id))
 
 
-@route("POST", "/operations/<id>/retry", "Does a failed or cancelled operation again.", "Operation", role="editor", status=202)
+@route("POST", "/operations/{id}/retry", "Does a failed or cancelled operation again.", "Operation", role="editor", status=202)
 def retry_operation(id: str) -> dict[str, Any]:
     return operation_value(catalogue().retry_operation(id))
 

@@ -1,1 +1,1 @@
-"""What all routes use: access, cookies, settings, statuses, compression, caches, public URLs, health, open tile stores."""
+"""What all routes use: tables of routes, the current request, bodies, responses, headers, errors, access, settings, open tile stores."""

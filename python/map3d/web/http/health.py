@@ -11,8 +11,6 @@ from map3d.object_store import open_object_store
 from map3d.tiles.manifest import FILE_NAME
 from map3d.tiles.track_stores import tiles_url
 
-READINESS: Final = "map3d.ready"
-"""Key of the Flask app's extensions: name → function that tells whether this part of the process works."""
 MAX_STORES: Final = 8
 """Places of tiles outside the workspace that a check of readiness looks at."""
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
-from map3d.web.http.current_app import workspace
+from map3d.web.http.current import workspace
 
 _HOST_FOLDER: Final = re.compile(r"(?:file://|(?<![^\s(\"'\[=,:]))/(?:[^\s/]+/)+")
 """The folders of an absolute path of the host, also as a URL. The `//` of other URLs begins none."""

@@ -8,13 +8,13 @@ from functools import cached_property
 from itertools import count
 from typing import Final
 
-from map3d.catalogue import Catalogue, Workspace
 from map3d.errors import BadRequest, NotFound
 from map3d.geometry.views import parse_view_id, track_id
 from map3d.tiles.decode_tile import find_layer, layer_names
 from map3d.tiles.tile_store import TileStore
 from map3d.tiles.track_stores import open_track
 from map3d.types import Layer
+from map3d.web.http.shared_catalogue import SharedCatalogue
 
 RECHECK_S: Final = 1.0
 """Interval between checks that a store was not replaced."""
@@ -63,12 +63,11 @@ class FoundLayer:
 class OpenStores:
     """Thread-safe."""
 
-    def __init__(self, workspace: Workspace, epoch: Callable[[str], object] = lambda _rendering: None) -> None:
+    def __init__(self, catalogue: SharedCatalogue, epoch: Callable[[str], object] = lambda _rendering: None) -> None:
         """`epoch` returns a value for a rendering that differs after each plan that opened jobs."""
-        self._workspace, self._epoch = workspace, epoch
+        self._catalogue, self._epoch = catalogue, epoch
         self._open: dict[tuple[str, str], OpenStore] = {}
         self._lock = threading.Lock()
-        self._catalogue: Catalogue | None = None
 
     def stores_of_view(self, rendering: str, view: str) -> Iterator[OpenStore]:
         """Yields the stores of a view's tracks, pass by pass; none if the rendering or the view does not exist."""
@@ -119,19 +118,11 @@ class OpenStores:
         with self._lock:
             while self._open:
                 self._open.popitem()[1].store.close()
-            if self._catalogue is not None:
-                self._catalogue.close()
-                self._catalogue = None
-
-    def _find_catalogue(self) -> Catalogue:
-        """Opens the catalogue on first use. Raises NotFound without a workspace."""
-        self._catalogue = self._catalogue or self._workspace.open_catalogue()
-        return self._catalogue
 
     def _try_open(self, rendering: str, track: str) -> OpenStore | None:
         epoch = self._epoch(rendering)
         try:
-            store = open_track(self._workspace, self._find_catalogue().rendering(rendering), track)
+            store = open_track(self._catalogue.workspace, self._catalogue().rendering(rendering), track)
         except (NotFound, BadRequest):
             return None
         return OpenStore(store, time.monotonic(), lambda: self._epoch(rendering) != epoch)

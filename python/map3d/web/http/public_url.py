@@ -4,9 +4,15 @@ Redirects and pages use relative URLs, which are right behind every proxy. Docum
 `public_url`.
 """
 
-from flask import current_app, request
+import re
+from typing import Final
 
+from map3d.web.http.asgi import Scope
+from map3d.web.http.conditions import header
+from map3d.web.http.current import request, site
 from map3d.web.http.settings import ServerSettings
+
+_HOST: Final = re.compile(r"[A-Za-z0-9._\-]+(:[0-9]+)?|\[[0-9a-fA-F:.]+\](:[0-9]+)?", re.ASCII)
 
 
 def public_url(path: str = "") -> str:
@@ -16,6 +22,11 @@ def public_url(path: str = "") -> str:
     It begins with the setting `public_url`. Without that setting, it begins with the host that the client named in the current request: right without
     a proxy, but for that client alone, so cache nothing that contains it.
     """
-    settings: ServerSettings = current_app.config["SETTINGS"]
-    root = settings.public_url or request.host_url.rstrip("/")
+    root = root_url(site().settings, request().scope)
     return f"{root}/{path.lstrip('/')}" if path else root
+
+
+def root_url(settings: ServerSettings, scope: Scope) -> str:
+    """Returns the absolute URL of the server's root for the client of a request."""
+    host = header(scope["headers"], b"host").decode("latin-1")
+    return settings.public_url or f"{scope.get('scheme', 'http')}://{host if _HOST.fullmatch(host) else 'localhost'}"

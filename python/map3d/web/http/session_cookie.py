@@ -1,37 +1,34 @@
 """The cookie of sessions."""
 
+from typing import Any, Final
 from urllib.parse import urlsplit
 
-from flask import current_app, request
-from werkzeug import Response
+from starlette.responses import Response
 
 from map3d.accounts import Session
 from map3d.accounts.sessions import MAX_AGE_S
-from map3d.web.http.access import COOKIE, access
-from map3d.web.http.settings import ServerSettings
+from map3d.web.http.access import COOKIE
+from map3d.web.http.current import request, site
+
+_SAME_SITE: Final[Any] = "Lax"
 
 
 def set_session(response: Response, session: Session) -> None:
     """Sends the session as a cookie that scripts cannot read and other sites do not send with forms."""
     response.set_cookie(
         COOKIE,
-        access().sessions.dump(session),
+        site().access.sessions.dump(session),
         max_age=MAX_AGE_S if session.user else None,
         path=_path(),
-        secure=request.is_secure or (_settings().public_url or "").startswith("https:"),
+        secure="https" in (request().scope.get("scheme"), urlsplit(site().settings.public_url or "").scheme),
         httponly=True,
-        samesite="Lax",
+        samesite=_SAME_SITE,
     )
 
 
 def delete_session(response: Response) -> None:
-    response.delete_cookie(COOKIE, path=_path(), httponly=True, samesite="Lax")
+    response.delete_cookie(COOKIE, path=_path(), httponly=True, samesite=_SAME_SITE)
 
 
 def _path() -> str:
-    return urlsplit(_settings().public_url or "").path.rstrip("/") + "/"
-
-
-def _settings() -> ServerSettings:
-    settings: ServerSettings = current_app.config["SETTINGS"]
-    return settings
+    return urlsplit(site().settings.public_url or "").path.rstrip("/") + "/"

@@ -13,7 +13,6 @@ from map3d.jobs.on_demand.worker import OnDemandSettings
 
 CONFIG_VARIABLE: Final = "MAP3D_CONFIG"
 PREFIX: Final = "MAP3D_"
-PUBLIC_URL_VARIABLE: Final = "MAP3D_PUBLIC_URL"
 DEFAULT_CACHE_BYTES: Final = 128 << 20
 LOG_FORMATS: Final = ("text", "json")
 _TRUE, _FALSE = ("1", "true", "yes", "on"), ("0", "false", "no", "off")

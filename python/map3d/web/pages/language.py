@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Final
 
-from flask import request
+from map3d.web.http.accepting import accepted
+from map3d.web.http.current import request
 
 TRANSLATIONS: Final = Path(__file__).parents[1] / "translations"
 LANGUAGES: Final = ("en", *sorted(path.stem for path in TRANSLATIONS.glob("*.json")))
@@ -11,5 +12,5 @@ LANGUAGES: Final = ("en", *sorted(path.stem for path in TRANSLATIONS.glob("*.jso
 
 def language() -> str:
     """Returns the first language of the browser that pages are written in, else English."""
-    requested = (name[:2].lower() for name in request.accept_languages.values())
+    requested = (name[:2] for name in accepted(request().headers.get("accept-language", "")))
     return next((name for name in requested if name in LANGUAGES), "en")

@@ -5,10 +5,10 @@ import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
-from hashlib import sha256
+from pathlib import Path
+from typing import Final
 
-from flask import Blueprint, Response, current_app, redirect, render_template, request, send_from_directory
-from werkzeug import Response as WerkzeugResponse
+from starlette.responses import Response
 
 from map3d.catalogue import RenderingRecord, Workspace
 from map3d.errors import Map3dError, NotFound
@@ -21,16 +21,19 @@ from map3d.tiles.preview import choose_preview
 from map3d.tiles.track_stores import read_manifest, tiles_url
 from map3d.tiles.viewer_files import PAGE, viewer_folder
 from map3d.types import check_name
-from map3d.web.http.compression import compress
-from map3d.web.http.current_app import catalogue, workspace
-from map3d.web.http.health import READINESS, check_alive, check_ready
+from map3d.web.http.current import catalogue, request, site, workspace
+from map3d.web.http.health import check_alive, check_ready
 from map3d.web.http.http_errors import status_of
 from map3d.web.http.public_url import public_url
-from map3d.web.http.settings import ServerSettings
+from map3d.web.http.responses import compress, document, file_response, redirect, uncached
+from map3d.web.http.routes import Routes
 from map3d.web.pages.share_dialog import add_share_dialog
+from map3d.web.pages.tools import render
 from map3d.web.tiles.picture_routes import link_url
 
-pages = Blueprint("pages", __name__)
+pages = Routes("pages")
+
+STATIC: Final = Path(__file__).parents[1] / "static"
 
 ICON_MAX_AGE_S = 86_400
 ON_DEMAND_PREVIEW_S = 60.0
@@ -57,39 +60,35 @@ class ListedRendering:
 
 
 @pages.get("/")
-def home() -> WerkzeugResponse:
+def home() -> Response:
     """Redirects to the map if the workspace has exactly one rendering with tiles; otherwise lists the renderings."""
     records = catalogue().renderings()
     if len(records) == 1 and read_manifest(workspace(), records[0]) is not None:
-        return _without_cache(redirect(f"view/{records[0].name}/"))
+        return redirect(f"view/{records[0].name}/", 302)
     return renderings()
 
 
 @pages.get("/renderings")
-def renderings() -> WerkzeugResponse:
+def renderings() -> Response:
     """Lists the renderings with pictures that are made of stored tiles."""
     listed = sorted((_describe(record) for record in catalogue().renderings()), key=lambda item: (item.changed is None, item.title.casefold()))
-    return _without_cache(compress(Response(render_template("renderings.html", renderings=listed), mimetype="text/html")))
+    return compress(uncached(render("renderings.html", renderings=listed)))
 
 
-@pages.get("/view/<rendering>/")
+@pages.get("/view/{rendering}/")
 def view(rendering: str) -> Response:
     """Returns the viewer's page; once the rendering has tiles, with its title and picture."""
     record = catalogue().rendering(check_name(rendering, "rendering"))
     data = read_manifest(workspace(), record)
     if data is None:
-        return compress(send_from_directory(viewer_folder(), PAGE, max_age=0))
+        return file_response(viewer_folder(), PAGE)
     manifest = Manifest.load(data, rendering)
     address, picture = _shared_view(rendering, manifest)
     page = add_share_dialog(describe_page((viewer_folder() / PAGE).read_text("utf-8"), manifest, picture, address))
-    response = Response(page, mimetype="text/html")
-    response.set_etag(sha256(page.encode()).hexdigest()[:32], weak=True)
-    response.headers["Cache-Control"] = "no-cache"
-    response.make_conditional(request)
-    return compress(response)
+    return document(page.encode(), "text/html")
 
 
-@pages.get(f"/view/<rendering>/{PREVIEW}")
+@pages.get(f"/view/{{rendering}}/{PREVIEW}")
 def preview(rendering: str) -> Response:
     """Returns a picture of the rendering for links to its page."""
     record = catalogue().rendering(check_name(rendering, "rendering"))
@@ -98,49 +97,49 @@ def preview(rendering: str) -> Response:
     picture = None if data is None else _preview(workspace(), rendering, data, age)
     if picture is None:
         raise NotFound(f"rendering {rendering!r} has no picture yet; run: map3d render {rendering}")
-    response = Response(picture, mimetype="image/jpeg")
-    response.set_etag(sha256(picture).hexdigest()[:32])
-    response.headers["Cache-Control"] = "no-cache"
-    response.make_conditional(request)
-    return response
+    return document(picture, "image/jpeg")
 
 
-@pages.get("/view/<rendering>/<path:file>")
+@pages.get("/view/{rendering}/{file:path}")
 def viewer_file(rendering: str, file: str) -> Response:
     catalogue().rendering(check_name(rendering, "rendering"))
-    return compress(send_from_directory(viewer_folder(), file, max_age=0))
+    return file_response(viewer_folder(), file)
 
 
-@pages.get("/favicon.ico", defaults={"file": "favicon.ico"})
-@pages.get("/favicon.svg", defaults={"file": "favicon.svg"})
-def icon(file: str) -> Response:
-    return compress(send_from_directory(current_app.static_folder or "", file, max_age=ICON_MAX_AGE_S))
+@pages.get("/favicon.ico")
+@pages.get("/favicon.svg")
+def icon() -> Response:
+    return file_response(STATIC, request()["path"][1:], ICON_MAX_AGE_S)
+
+
+@pages.get("/static/{file:path}")
+def static(file: str) -> Response:
+    return file_response(STATIC, file)
 
 
 @pages.get("/healthz")
-def healthz() -> WerkzeugResponse:
+def healthz() -> Response:
     """Answers 200 while the workspace exists and its catalogue is readable."""
     check_alive(workspace(), catalogue())
-    return _without_cache(Response("ok\n", mimetype="text/plain"))
+    return uncached("ok\n", media_type="text/plain")
 
 
 @pages.get("/readyz")
-def readyz() -> WerkzeugResponse:
+def readyz() -> Response:
     """Answers 200 while the server can do its work, else 503; names the parts that cannot."""
     state = check_ready(workspace(), catalogue(), writes=renders_on_demand())
-    state |= {name: "ok" if is_alive() else "not running" for name, is_alive in current_app.extensions[READINESS].items()}
+    state |= {name: "ok" if is_alive() else "not running" for name, is_alive in site().parts.items()}
     status = 200 if set(state.values()) == {"ok"} else 503
-    return _without_cache(Response(json.dumps(state, indent=1) + "\n", status, mimetype="application/json"))
+    return uncached(json.dumps(state, indent=1) + "\n", status, "application/json")
 
 
 def renders_on_demand() -> bool:
-    settings: ServerSettings = current_app.config["SETTINGS"]
-    return settings.on_demand is not None
+    return site().settings.on_demand is not None
 
 
 def _shared_view(rendering: str, manifest: Manifest) -> tuple[str, str | None]:
     """Returns the address of the page and of its picture: those of the view that the query names, else those of the whole rendering."""
-    link = request.args.get("view")
+    link = request().query_params.get("view")
     if link is not None:
         try:
             picture = parse_link(manifest, link, (WIDTH_PX, HEIGHT_PX), "image/jpeg")
@@ -149,11 +148,6 @@ def _shared_view(rendering: str, manifest: Manifest) -> tuple[str, str | None]:
             pass  # the page itself shows what it can of a broken link
     address = public_url(f"view/{rendering}/")
     return address, address + PREVIEW if choose_preview(manifest) else None
-
-
-def _without_cache(response: WerkzeugResponse) -> WerkzeugResponse:
-    response.headers["Cache-Control"] = "no-store"
-    return response
 
 
 @lru_cache(maxsize=64)

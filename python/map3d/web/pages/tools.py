@@ -2,30 +2,28 @@
 
 import json
 from functools import cache
-from typing import Any
+from typing import Any, Final
 
-from flask import Flask, g, request
+from jinja2 import Environment, FileSystemLoader
 from markupsafe import Markup
 
-from map3d.accounts import Session
-from map3d.web.http.access import COOKIE, CSRF_FIELD, access, current_caller
+from map3d.web.http.access import COOKIE, CSRF_FIELD
+from map3d.web.http.current import request
 from map3d.web.http.host_folders import without_host_folders
-from map3d.web.http.session_cookie import set_session
 from map3d.web.pages.formats import FILTERS, number_or_text
 from map3d.web.pages.language import TRANSLATIONS, language
 
+TEMPLATES: Final = Environment(loader=FileSystemLoader(TRANSLATIONS.with_name("templates")), autoescape=True, trim_blocks=True, lstrip_blocks=True)
 
-def add_page_tools(app: Flask) -> None:
-    """Adds the functions and filters to the templates of the app."""
-    app.jinja_env.globals.update(_=translate, language=language, relative=relative, caller=page_caller, csrf=csrf_field, csrf_value=csrf_value)
-    app.jinja_env.filters.update(FILTERS, without_host_folders=without_host_folders)
-    app.jinja_env.trim_blocks = app.jinja_env.lstrip_blocks = True
-    app.after_request(_set_new_session)
+
+def render(template: str, **values: Any) -> str:
+    """Returns the page that a template makes of the values."""
+    return TEMPLATES.get_template(template).render(values)
 
 
 def relative(path: str) -> str:
     """Returns a path below the server's root relative to the current page, so that it is right behind every proxy."""
-    up = request.path.count("/") - 1
+    up = request()["path"].count("/") - 1
     return "../" * up + path.lstrip("/") or "./"
 
 
@@ -45,16 +43,16 @@ def translations(name: str) -> dict[str, str]:
 
 def page_caller() -> Any:
     """Returns the identity of the signed-in user, None for a visitor. A request without a cookie costs no look-up."""
-    return current_caller().identity if request.cookies.get(COOKIE) or request.authorization else None
+    asked = request()
+    return asked.caller.identity if asked.cookies.get(COOKIE) or "authorization" in asked.headers else None
 
 
 def csrf_value() -> str:
     """Returns the value that forms send back. A visitor without a session gets a new one with the response."""
-    session: Session | None = current_caller().session
+    asked = request()
+    session = asked.caller.session or asked.new_session
     if session is None:
-        session = g.get("map3d_new_session")
-    if session is None:
-        session = g.map3d_new_session = access().sessions.start()
+        session = asked.new_session = asked.site.access.sessions.start()
     return session.csrf
 
 
@@ -62,8 +60,5 @@ def csrf_field() -> Markup:
     return Markup('<input type="hidden" name="{}" value="{}">').format(CSRF_FIELD, csrf_value())
 
 
-def _set_new_session(response: Any) -> Any:
-    session = g.get("map3d_new_session")
-    if session is not None:
-        set_session(response, session)
-    return response
+TEMPLATES.globals.update(_=translate, language=language, relative=relative, caller=page_caller, csrf=csrf_field, csrf_value=csrf_value)
+TEMPLATES.filters.update(FILTERS, without_host_folders=without_host_folders)

@@ -1,1 +1,1 @@
-"""Runs the app: composes all routes, reads bodies, measures, logs and answers errors."""
+"""Runs the app: composes all routes, calls view functions, measures, logs and answers errors."""

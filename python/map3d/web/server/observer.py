@@ -3,12 +3,12 @@
 import re
 import secrets
 import time
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, Final
 
+from map3d.web.http.asgi import Application, Receive, Scope, Send
 from map3d.web.server.logs import ACCESS
 from map3d.web.server.metrics import ROUTES, Metrics
-from map3d.web.tiles.tile_route import Receive, Scope, Send
 
 CLIENT_CLOSED: Final = 499
 """Status in logs and metrics of a request without an answer."""
@@ -23,7 +23,7 @@ class Observer:
     def __init__(self, metrics: Metrics | None, access_log: bool) -> None:
         self.metrics, self.access_log = metrics, access_log
 
-    async def __call__(self, answer: Callable[[Scope, Receive, Send], Awaitable[None]], scope: Scope, receive: Receive, send: Send) -> None:
+    async def __call__(self, answer: Application, scope: Scope, receive: Receive, send: Send) -> None:
         start, seen = time.perf_counter(), [CLIENT_CLOSED, 0]
         request_id = _request_id(scope["headers"]) if self.access_log else ""
 

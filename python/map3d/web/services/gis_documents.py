@@ -2,10 +2,9 @@
 
 import json
 import math
-from hashlib import sha256
 from typing import Any, Final
 
-from flask import Blueprint, Response, current_app, request
+from starlette.responses import Response
 
 from map3d.errors import BadRequest
 from map3d.geometry.view_plane_crs import check_height
@@ -15,24 +14,16 @@ from map3d.tile_services.tile_formats import suffix_of
 from map3d.tile_services.tiled_view import WEB_MERCATOR, NotOffered, TiledView
 from map3d.tile_services.tilejson import tilejson, xyz_template
 from map3d.types import Layer
-from map3d.web.http.compression import compress
+from map3d.web.http.current import request, site
 from map3d.web.http.public_url import public_url
-from map3d.web.tiles.tiled_views import TiledViews
+from map3d.web.http.responses import document, uncached
+from map3d.web.http.routes import Routes
 
-tile_services = Blueprint("tile_services", __name__)
+tile_services = Routes("tile_services")
 
-SERVICE_PREFIXES: Final = ("/ogc", "/wmts", "/tilejson/", "/xyz/", "/gis/")
-"""Paths that pages of other origins may read."""
-VIEWS: Final = "map3d.tiled_views"
 MAX_NUMBER: Final = 32
 """Characters of a number."""
 _JSON: Final = "application/json"
-
-
-def views() -> TiledViews:
-    """Returns the tiled views of the current app."""
-    found: TiledViews = current_app.extensions[VIEWS]
-    return found
 
 
 @tile_services.get("/ogc")
@@ -53,28 +44,28 @@ def api() -> Response:
 
 @tile_services.get("/ogc/collections")
 def collections() -> Response:
-    return _json(ogc_documents.collections(views().all(), _ogc()))
+    return _json(ogc_documents.collections(site().views.all(), _ogc()))
 
 
-@tile_services.get("/ogc/collections/<collection>")
+@tile_services.get("/ogc/collections/{collection}")
 def collection(collection: str) -> Response:
     return _json(ogc_documents.collection(_view(collection), _ogc()))
 
 
-@tile_services.get("/ogc/collections/<collection>/styles")
+@tile_services.get("/ogc/collections/{collection}/styles")
 def styles(collection: str) -> Response:
     return _json(ogc_documents.styles(_view(collection), _ogc()))
 
 
-@tile_services.get("/ogc/collections/<collection>/map/tiles")
-@tile_services.get("/ogc/collections/<collection>/styles/<style>/map/tiles")
+@tile_services.get("/ogc/collections/{collection}/map/tiles")
+@tile_services.get("/ogc/collections/{collection}/styles/{style}/map/tiles")
 def tile_sets(collection: str, style: str | None = None) -> Response:
     view = _view(collection)
     return _json(ogc_documents.tile_sets(view, _ogc(), _layer(view, style)))
 
 
-@tile_services.get("/ogc/collections/<collection>/map/tiles/<tile_matrix_set>")
-@tile_services.get("/ogc/collections/<collection>/styles/<style>/map/tiles/<tile_matrix_set>")
+@tile_services.get("/ogc/collections/{collection}/map/tiles/{tile_matrix_set}")
+@tile_services.get("/ogc/collections/{collection}/styles/{style}/map/tiles/{tile_matrix_set}")
 def tile_set(collection: str, tile_matrix_set: str, style: str | None = None) -> Response:
     view = _view(collection)
     view.check_tile_matrix_set(tile_matrix_set)
@@ -83,10 +74,10 @@ def tile_set(collection: str, tile_matrix_set: str, style: str | None = None) ->
 
 @tile_services.get("/ogc/tileMatrixSets")
 def tile_matrix_sets() -> Response:
-    return _json(ogc_documents.tile_matrix_sets(views().all(), _ogc()))
+    return _json(ogc_documents.tile_matrix_sets(site().views.all(), _ogc()))
 
 
-@tile_services.get("/ogc/tileMatrixSets/<name>")
+@tile_services.get("/ogc/tileMatrixSets/{name}")
 def tile_matrix_set(name: str) -> Response:
     view = _web_mercator_view() if name == WEB_MERCATOR else _view(name)
     view.check_tile_matrix_set(name)
@@ -95,13 +86,13 @@ def tile_matrix_set(name: str) -> Response:
 
 @tile_services.get(f"/wmts/{wmts.VERSION}/WMTSCapabilities.xml")
 def wmts_capabilities() -> Response:
-    return _document(wmts.capabilities(views().all(), public_url("wmts")), "application/xml")
+    return document(wmts.capabilities(site().views.all(), public_url("wmts")), "application/xml")
 
 
 @tile_services.get("/wmts")
 def wmts_key_value_pairs() -> Response:
     """Answers GetCapabilities; the tile service route answers GetTile."""
-    pairs = {key.lower(): value for key, value in request.args.items()}
+    pairs = {key.lower(): value for key, value in request().query_params.items()}
     operation = pairs.get("request", "")
     if operation.lower() == "getcapabilities":
         return wmts_capabilities()
@@ -109,34 +100,32 @@ def wmts_key_value_pairs() -> Response:
         ("MissingParameterValue", "parameter REQUEST is missing") if not operation else ("OperationNotSupported", f"no operation {operation!r:.70}")
     )
     report = wmts.exception_report(code, f"{text}; expected GetCapabilities or GetTile", "REQUEST")
-    response = Response(report, 400, mimetype="text/xml")
-    response.headers["Cache-Control"] = "no-store"
-    return response
+    return uncached(report, 400, "text/xml")
 
 
-@tile_services.get("/tilejson/<rendering>/<view>.json")
+@tile_services.get("/tilejson/{rendering}/{view}.json")
 def tile_json(rendering: str, view: str) -> Response:
-    found = views().view(rendering, f"{rendering}:{view}")
-    return _json(tilejson(found, public_url(), found.layer(request.args.get("layer"))))
+    found = site().views.view(rendering, f"{rendering}:{view}")
+    return _json(tilejson(found, public_url(), found.layer(request().query_params.get("layer"))))
 
 
-@tile_services.get("/gis/<rendering>/<view>.<suffix>")
+@tile_services.get("/gis/{rendering}/{view}.{suffix}")
 def layer_definition(rendering: str, view: str, suffix: str) -> Response:
     """Returns a layer definition for QGIS (qlr) or GDAL (xml), or the CRS of the view's plane (wkt), for ground points at the query's `height`."""
-    found = views().view(rendering, f"{rendering}:{view}")
+    found = site().views.view(rendering, f"{rendering}:{view}")
     if suffix not in SUFFIXES:
         raise NotOffered(f"no definition {suffix!r:.70}; expected {', '.join(SUFFIXES)}")
     manifest, height_m = found.manifest, _height()
     if suffix == "wkt":
-        return _document(wkt(manifest, found.view, height_m).encode(), "text/plain; charset=utf-8")
-    layer = found.layer(request.args.get("layer"))
+        return document(wkt(manifest, found.view, height_m).encode(), "text/plain; charset=utf-8")
+    layer = found.layer(request().query_params.get("layer"))
     template = xyz_template(found, public_url(), layer, suffix_of(layer.media_type))
     make = qgis_layer if suffix == "qlr" else gdal_wms
-    return _document(make(manifest, found.view, layer, template, height_m).encode(), "application/xml")
+    return document(make(manifest, found.view, layer, template, height_m).encode(), "application/xml")
 
 
 def _height() -> float | None:
-    text = request.args.get("height")
+    text = request().query_params.get("height")
     if text is None:
         return None
     try:
@@ -149,12 +138,12 @@ def _view(view_id: str) -> TiledView:
     rendering, separator, _ = view_id.partition(":")
     if not separator:
         raise NotOffered(f"no collection {view_id!r:.150}; a collection is <rendering>:<view>")
-    return views().view(rendering, view_id)
+    return site().views.view(rendering, view_id)
 
 
 def _web_mercator_view() -> TiledView:
     """Returns the view with the most levels."""
-    all_views = [view for view in views().all() if view.pseudo]
+    all_views = [view for view in site().views.all() if view.pseudo]
     if not all_views:
         raise NotOffered("no rendering has tiles of 256 px, as WebMercatorQuad requires")
     return max(all_views, key=lambda view: view.manifest.zmax)
@@ -169,14 +158,6 @@ def _ogc() -> str:
 
 
 def _json(value: Any, media_type: str = _JSON) -> Response:
-    if request.args.get("f", "json") != "json":
-        raise BadRequest(f"f={request.args['f']!r:.70}: this document is available as json")
-    return _document(json.dumps(value, ensure_ascii=False, allow_nan=False).encode(), media_type)
-
-
-def _document(data: bytes, media_type: str) -> Response:
-    response = Response(data, content_type=media_type)
-    response.set_etag(sha256(data).hexdigest()[:32], weak=True)
-    response.headers["Cache-Control"] = "no-cache"
-    response.make_conditional(request)
-    return compress(response)
+    if request().query_params.get("f", "json") != "json":
+        raise BadRequest(f"f={request().query_params['f']!r:.70}: this document is available as json")
+    return document(json.dumps(value, ensure_ascii=False, allow_nan=False).encode(), media_type)

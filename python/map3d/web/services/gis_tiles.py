@@ -6,10 +6,12 @@ WebP and JPEG to PNG for clients that ask for PNG.
 
 import asyncio
 import json
-from collections.abc import Awaitable, Callable, MutableMapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any, Final
+from dataclasses import replace
+from typing import Final
+
+from starlette.exceptions import HTTPException
+from starlette.responses import Response
 
 from map3d.errors import BadRequest, NotFound
 from map3d.tile_services.tile_address import InvalidParameter, InvalidTile, TileAddress, is_tile_url, parse_tile_address, resolve_tile
@@ -18,58 +20,47 @@ from map3d.tile_services.tiled_view import TiledView
 from map3d.tile_services.wmts import exception_report
 from map3d.tiles.manifest import block_version
 from map3d.types import Layer
+from map3d.web.http.asgi import Receive, Scope, Send
 from map3d.web.http.byte_lru import ByteLru
-from map3d.web.http.http_errors import status_of
-from map3d.web.tiles.tile_route import COMMON, NO_STORE, Headers, Receive, Scope, Send, etag_matches
-from map3d.web.tiles.tiled_views import TiledViews
-
-Application = Callable[[Scope, Receive, Send], Awaitable[None]]
+from map3d.web.http.headers import ANY_ORIGIN, IMMUTABLE, NO_CACHE
+from map3d.web.http.http_errors import error_headers, not_allowed, plain_error, status_of
+from map3d.web.http.tiled_views import TiledViews
+from map3d.web.tiles.tile_route import KeptResponse, TileRoute, for_client
 
 THREADS: Final = 2
 DEFAULT_CACHE_BYTES: Final = 32 << 20
 """Memory for converted tiles."""
-NO_CACHE: Final = b"no-cache"
-
-
-@dataclass(frozen=True)
-class _Answer:
-    status: int
-    headers: Headers
-    body: bytes
 
 
 class TileServiceRoute:
     """Belongs to one event loop."""
 
-    def __init__(self, tiles: Application, views: TiledViews, cache_bytes: int = DEFAULT_CACHE_BYTES) -> None:
+    def __init__(self, tiles: TileRoute, views: TiledViews, cache_bytes: int = DEFAULT_CACHE_BYTES) -> None:
         self._tiles, self._views = tiles, views
         self._converted: ByteLru[tuple[bytes, str], bytes] = ByteLru(cache_bytes)
         self._threads = ThreadPoolExecutor(THREADS, thread_name_prefix="tile-services")
 
-    def matches(self, path: str, query: bytes) -> bool:
-        return is_tile_url(path, query)
+    def answers(self, scope: Scope) -> bool:
+        return is_tile_url(scope["path"], scope["query_string"])
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        head = scope["method"] == "HEAD"
-        if scope["method"] not in ("GET", "HEAD"):
-            await _send(send, _error(scope["path"], 405, "method not allowed; use GET or HEAD", [(b"allow", b"GET, HEAD")]), head=False)
-            return
         try:
+            if scope["method"] not in ("GET", "HEAD"):
+                raise not_allowed("GET", "HEAD")
             address = parse_tile_address(scope["path"], scope["query_string"])
             view = await self._find_view(address)
             layer, media_type = resolve_tile(address, view)
+            tile = _adapt(await self._tiles.find(_tile_key(address, view, layer), receive), view.manifest.tile_px, media_type)
+            if tile.etag and media_type != layer.media_type:
+                tile = await self._convert(tile, media_type)
         except Exception as error:
-            await _send(send, _error_answer(scope["path"], error), head=head)
+            await _error_response(scope["path"], error)(scope, receive, send)
             return
-        inner = _tile_scope(scope, address, view, layer)
-        if media_type == layer.media_type:
-            await self._tiles(inner, receive, _Relay(send, view.manifest.tile_px, media_type, head=head))
-        else:
-            await self._send_converted(inner, receive, send, view.manifest.tile_px, media_type, head=head)
+        for message in for_client(tile, scope).messages:
+            await send(message)
 
     async def close(self) -> None:
         self._threads.shutdown(cancel_futures=True)
-        self._views.close()
 
     async def _find_view(self, address: TileAddress) -> TiledView:
         view = self._views.known_view(address.rendering, address.view_id)
@@ -77,86 +68,43 @@ class TileServiceRoute:
             return view
         return await asyncio.get_running_loop().run_in_executor(self._threads, self._views.view, address.rendering, address.view_id)
 
-    async def _send_converted(self, scope: Scope, receive: Receive, send: Send, tile_px: int, media_type: str, *, head: bool) -> None:
-        asked = _header(scope["headers"], b"if-none-match")
-        kept = [pair for pair in scope["headers"] if pair[0] not in (b"if-none-match", b"range", b"if-range")]
-        collected = _Collector()
-        await self._tiles({**scope, "method": "GET", "headers": kept}, receive, _Relay(collected, tile_px, media_type, head=False))
-        answer = _Answer(collected.status, collected.headers, b"".join(collected.body))
-        etag = _header(answer.headers, b"etag")
-        if answer.status == 200 and _header(answer.headers, b"content-type") != media_type.encode():
-            try:
-                answer = await self._convert(answer, etag, media_type)
-            except Exception as error:
-                answer = _error_answer(scope["path"], error)
-        if etag_matches(asked, _header(answer.headers, b"etag")):
-            answer = _Answer(304, [pair for pair in answer.headers if pair[0] not in (b"content-length", b"content-type")], b"")
-        await _send(send, answer, head=head)
-
-    async def _convert(self, answer: _Answer, etag: bytes, media_type: str) -> _Answer:
-        data = self._converted.get((etag, media_type))
+    async def _convert(self, tile: KeptResponse, media_type: str) -> KeptResponse:
+        """Returns the tile with its picture in the media type."""
+        data = self._converted.get((tile.etag, media_type))
         if data is None:
-            data = await asyncio.get_running_loop().run_in_executor(self._threads, convert_tile, answer.body, media_type)
-            self._converted.put((etag, media_type), data, len(data))
-        replaced = {
-            b"content-type": media_type.encode(),
-            b"content-length": str(len(data)).encode(),
-            b"etag": etag[:-1] + b"-" + suffix_of(media_type).encode() + b'"',
-        }
-        headers = [(name, replaced.get(name, value)) for name, value in answer.headers if name != b"accept-ranges"]
-        return _Answer(200, headers, data)
+            data = await asyncio.get_running_loop().run_in_executor(self._threads, convert_tile, tile.body, media_type)
+            self._converted.put((tile.etag, media_type), data, len(data))
+        etag = b'%s-%s"' % (tile.etag[:-1], suffix_of(media_type).encode())
+        replaced = {b"content-type": media_type.encode(), b"content-length": str(len(data)).encode(), b"etag": etag}
+        return KeptResponse(200, [(name, replaced.get(name, value)) for name, value in tile.headers], data, etag)
 
 
-class _Relay:
-    """Forwards the answer of the tile route, with an image in place of an empty tile, and without permission to cache forever: the URL has no
-    version."""
-
-    def __init__(self, send: Send, tile_px: int, media_type: str, *, head: bool) -> None:
-        self._send, self._tile_px, self._media_type, self._head = send, tile_px, media_type, head
-        self._image: bytes | None = None
-
-    async def __call__(self, message: MutableMapping[str, Any]) -> None:
-        if message["type"] == "http.response.start":
-            headers = [(name, NO_CACHE if name == b"cache-control" and value != NO_STORE else value) for name, value in message["headers"]]
-            status = message["status"]
-            if status == 204:
-                status, self._image = 200, empty_tile(self._tile_px, self._media_type)
-                headers += [(b"content-type", self._media_type.encode()), (b"content-length", str(len(self._image)).encode())]
-            message = {**message, "status": status, "headers": headers}
-        elif self._image is not None:
-            message = {**message, "body": b"" if self._head else self._image}
-        await self._send(message)
+def _adapt(tile: KeptResponse, tile_px: int, media_type: str) -> KeptResponse:
+    """Returns the tile, an image in the place of an empty one, without permission to cache forever: the URL has no version."""
+    headers = [(name, NO_CACHE if value == IMMUTABLE else value) for name, value in tile.headers]
+    if tile.status != 204:
+        return replace(tile, headers=headers)
+    image = empty_tile(tile_px, media_type)
+    return KeptResponse(200, [*headers, (b"content-type", media_type.encode()), (b"content-length", str(len(image)).encode())], image)
 
 
-class _Collector:
-    """Keeps an answer in memory."""
-
-    def __init__(self) -> None:
-        self.status, self.headers = 500, Headers()
-        self.body: list[bytes] = []
-
-    async def __call__(self, message: MutableMapping[str, Any]) -> None:
-        if message["type"] == "http.response.start":
-            self.status, self.headers = message["status"], message["headers"]
-        else:
-            self.body.append(message.get("body", b""))
-
-
-def _tile_scope(scope: Scope, address: TileAddress, view: TiledView, layer: Layer) -> Scope:
-    """Returns the scope of the tile's own URL, with the version of its block: then the tile route keeps the tile in memory."""
+def _tile_key(address: TileAddress, view: TiledView, layer: Layer) -> tuple[str, bytes]:
+    """Returns the key of the tile with the version of its block: then the tile route keeps the tile in memory."""
     number = next(number for number, layers in enumerate(view.manifest.passes) if layer in layers)
-    version = block_version(view.view, address.tile, number)
     z, x, y = address.tile
-    path = f"/tiles/{view.manifest.name}/{view.view.frame.id}/{layer.name}/{z}/{x}/{y}"
-    return {**scope, "path": path, "raw_path": path.encode(), "query_string": f"v={version}".encode()}
+    return f"/{view.manifest.name}/{view.view.frame.id}/{layer.name}/{z}/{x}/{y}", b"v=%d" % block_version(view.view, address.tile, number)
 
 
-def _error_answer(path: str, error: Exception) -> _Answer:
+def _error_response(path: str, error: Exception) -> Response:
+    """Returns an error as the service of the path writes it."""
+    if not path.startswith(("/ogc", "/wmts")) or (path.startswith("/wmts") and isinstance(error, HTTPException)):
+        return plain_error(error, ANY_ORIGIN)
     status, text = status_of(error)
-    if not path.startswith("/wmts"):
-        return _error(path, status, text)
+    headers = {**ANY_ORIGIN, **error_headers(error)}
+    if path.startswith("/ogc"):
+        return Response(json.dumps({"title": text, "status": status}), status, headers, "application/problem+json")
     code, locator = _wmts_code(error)
-    return _problem(400 if code != "NoApplicableCode" else status, "text/xml", exception_report(code, text, locator))
+    return Response(exception_report(code, text, locator), 400 if code != "NoApplicableCode" else status, {"Content-Type": "text/xml", **headers})
 
 
 def _wmts_code(error: Exception) -> tuple[str, str | None]:
@@ -168,23 +116,3 @@ def _wmts_code(error: Exception) -> tuple[str, str | None]:
     if isinstance(error, NotFound):
         return "InvalidParameterValue", "Layer"
     return ("InvalidParameterValue", "Format") if isinstance(error, BadRequest) else ("NoApplicableCode", None)
-
-
-def _error(path: str, status: int, text: str, more: Headers | None = None) -> _Answer:
-    if path.startswith("/ogc"):
-        return _problem(status, "application/problem+json", json.dumps({"title": text, "status": status}).encode(), more)
-    return _problem(status, "text/plain; charset=utf-8", f"{text}\n".encode(), more)
-
-
-def _problem(status: int, media_type: str, body: bytes, more: Headers | None = None) -> _Answer:
-    headers = [(b"content-type", media_type.encode()), (b"content-length", str(len(body)).encode()), (b"cache-control", NO_STORE)]
-    return _Answer(status, [*headers, *COMMON, *(more or [])], body)
-
-
-async def _send(send: Send, answer: _Answer, *, head: bool) -> None:
-    await send({"type": "http.response.start", "status": answer.status, "headers": answer.headers})
-    await send({"type": "http.response.body", "body": b"" if head else answer.body})
-
-
-def _header(headers: Headers, name: bytes) -> bytes:
-    return b",".join(value for key, value in headers if key == name)

@@ -4,9 +4,8 @@ from datetime import datetime
 from itertools import islice
 from typing import Any, Final
 
-from flask import Blueprint, jsonify, request
-from werkzeug import Response
-from werkzeug.datastructures import MultiDict
+from starlette.datastructures import ImmutableMultiDict
+from starlette.responses import Response
 
 from map3d.catalogue import OperationRecord, RenderingRecord, State
 from map3d.catalogue.operation_records import OperationState
@@ -18,35 +17,37 @@ from map3d.requests import CreateRendering, Publish
 from map3d.scenes.build import is_stale
 from map3d.tiles.track_stores import read_manifest
 from map3d.types import check_name
-from map3d.web.http.access import requires
-from map3d.web.http.current_app import catalogue, workspace
+from map3d.web.http.current import Fields, catalogue, request, site, workspace
+from map3d.web.http.guards import requires
+from map3d.web.http.responses import json_value
+from map3d.web.http.routes import Routes
 from map3d.web.pages.formats import duration, size
 from map3d.web.pages.tools import translate
 from map3d.web.studio.forms import form_values, more_controls
 from map3d.web.studio.operation_words import show_all
 from map3d.web.studio.rendering_form import RenderingForm, read_form, read_preview
 from map3d.web.studio.scene_pages import name_from
-from map3d.web.studio.shared import ask, check_typed_name, folder_choice, go_to, page, previews
+from map3d.web.studio.shared import ask, check_typed_name, folder_choice, go_to, page
 
-rendering_pages = Blueprint("rendering_pages", __name__, url_prefix="/studio")
+rendering_pages = Routes("rendering_pages", "/studio")
 
 OPERATIONS: Final = 6
 QUARANTINED: Final = 50
 PREVIEW_AGE_S: Final = 300
 
 
-@rendering_pages.get("/scenes/<scene>/renderings/new")
+@rendering_pages.get("/scenes/{scene}/renderings/new")
 @requires("editor")
 def new_rendering(scene: str) -> Response:
     """Shows the form; without JavaScript, its button "Update preview" shows it again with other pictures."""
-    form = read_form(request.args)
+    form = read_form(request().query_params)
     return _form_page(scene, form, form.problem)
 
 
-@rendering_pages.post("/scenes/<scene>/renderings/new")
+@rendering_pages.post("/scenes/{scene}/renderings/new")
 @requires("editor")
 def send_new_rendering(scene: str) -> Response:
-    form = read_form(request.form)
+    form = read_form(request().form)
     name = form.name or name_from(form.title) or scene
     try:
         create_rendering(workspace(), catalogue(), form.request(scene, name))
@@ -56,61 +57,58 @@ def send_new_rendering(scene: str) -> Response:
     return go_to(f"studio/renderings/{name}")
 
 
-@rendering_pages.get("/scenes/<scene>/preview.jpg")
+@rendering_pages.get("/scenes/{scene}/preview.jpg")
 @requires("editor")
 def preview(scene: str) -> Response:
-    wanted = read_preview(request.args)
+    wanted = read_preview(request().query_params)
     record = catalogue().scene(check_name(scene, "scene"))
-    layer = wanted.layer(record, previews().box(catalogue(), scene))
-    response = Response(previews().picture(catalogue(), scene, wanted.view, layer, wanted.res_m, wanted.at), mimetype="image/jpeg")
-    response.headers["Cache-Control"] = f"private, max-age={PREVIEW_AGE_S}"
-    return response
+    layer = wanted.layer(record, site().previews.box(catalogue(), scene))
+    drawn = site().previews.picture(catalogue(), scene, wanted.view, layer, wanted.res_m, wanted.at)
+    return Response(drawn, 200, {"Cache-Control": f"private, max-age={PREVIEW_AGE_S}"}, "image/jpeg")
 
 
-@rendering_pages.get("/scenes/<scene>/estimate.json")
+@rendering_pages.get("/scenes/{scene}/estimate.json")
 @requires("editor")
 def estimate(scene: str) -> Response:
     """Returns the estimate in words, or a problem in words."""
     try:
-        return jsonify(_estimate_words(scene, read_form(request.args)))
+        return json_value(_estimate_words(scene, read_form(request().query_params)))
     except BadRequest as error:
-        response = jsonify({"problem": str(error)})
-        response.status_code = 400
-        return response
+        return json_value({"problem": str(error)}, 400)
 
 
-@rendering_pages.get("/renderings/<rendering>")
+@rendering_pages.get("/renderings/{rendering}")
 @requires("viewer")
 def rendering_page(rendering: str) -> Response:
-    return _rendering_page(rendering, MultiDict())
+    return _rendering_page(rendering, ImmutableMultiDict())
 
 
-@rendering_pages.post("/renderings/<rendering>/render")
+@rendering_pages.post("/renderings/{rendering}/render")
 @requires("editor")
 def render(rendering: str) -> Response:
     catalogue().rendering(check_name(rendering, "rendering"))
-    ask("render", rendering, **({"retry_quarantined": True} if request.form.get("retry") else {}))
+    ask("render", rendering, **({"retry_quarantined": True} if request().form.get("retry") else {}))
     return go_to(f"studio/renderings/{rendering}")
 
 
-@rendering_pages.post("/renderings/<rendering>/publish")
+@rendering_pages.post("/renderings/{rendering}/publish")
 @requires("editor")
 def publish(rendering: str) -> Response:
     catalogue().rendering(check_name(rendering, "rendering"))
     try:
-        ask("publish", rendering, **form_values(Publish, request.form))
+        ask("publish", rendering, **form_values(Publish, request().form))
     except BadRequest as error:
-        return _rendering_page(rendering, request.form, str(error), 400)
+        return _rendering_page(rendering, request().form, str(error), 400)
     return go_to(f"studio/renderings/{rendering}")
 
 
-@rendering_pages.get("/renderings/<rendering>/published/<folder>/remove")
+@rendering_pages.get("/renderings/{rendering}/published/{folder}/remove")
 @requires("editor")
 def remove_folder(rendering: str, folder: str) -> Response:
     return _folder_removal_page(rendering, folder)
 
 
-@rendering_pages.post("/renderings/<rendering>/published/<folder>/remove")
+@rendering_pages.post("/renderings/{rendering}/published/{folder}/remove")
 @requires("editor")
 def send_remove_folder(rendering: str, folder: str) -> Response:
     find_published(workspace(), catalogue().rendering(check_name(rendering, "rendering")).name, folder)
@@ -122,13 +120,13 @@ def send_remove_folder(rendering: str, folder: str) -> Response:
     return go_to(f"studio/renderings/{rendering}")
 
 
-@rendering_pages.get("/renderings/<rendering>/remove")
+@rendering_pages.get("/renderings/{rendering}/remove")
 @requires("editor")
 def remove(rendering: str) -> Response:
     return _removal_page(rendering)
 
 
-@rendering_pages.post("/renderings/<rendering>/remove")
+@rendering_pages.post("/renderings/{rendering}/remove")
 @requires("editor")
 def send_remove(rendering: str) -> Response:
     record = catalogue().rendering(check_name(rendering, "rendering"))
@@ -136,11 +134,11 @@ def send_remove(rendering: str) -> Response:
         check_typed_name(rendering)
     except BadRequest as error:
         return _removal_page(rendering, str(error), 400)
-    ask("remove", rendering, what="rendering", folders=request.form.getlist("published"))
+    ask("remove", rendering, what="rendering", folders=request().form.getlist("published"))
     return go_to(f"studio/scenes/{record.scene}")
 
 
-def _rendering_page(rendering: str, sent: MultiDict[str, str], problem: str = "", status: int = 200) -> Response:
+def _rendering_page(rendering: str, sent: Fields, problem: str = "", status: int = 200) -> Response:
     """`sent`: the form of a publication with a `problem`."""
     record = catalogue().rendering(check_name(rendering, "rendering"))
     found = catalogue().operations(scene=record.scene, limit=50)
@@ -171,17 +169,19 @@ def _form_page(scene: str, form: RenderingForm, problem: str, status: int = 200)
     record = catalogue().scene(check_name(scene, "scene"))
     built = bool(catalogue().assets(scene)) and not is_stale(workspace(), catalogue(), scene)
     words: dict[str, Any] = {}
-    if built and request.args.get("estimate"):
+    asked = request()
+    sent = asked.form if asked["method"] == "POST" else asked.query_params
+    if built and asked.query_params.get("estimate"):
         try:
             words = _estimate_words(scene, form)
         except Map3dError as error:
             words = {"problem": str(error)}
     values = {"scene": record, "form": form, "problem": problem, "built": built, "words": words}
-    return page("new_rendering.html", status, **values, more=more_controls(CreateRendering, request.values))
+    return page("new_rendering.html", status, **values, more=more_controls(CreateRendering, sent), query=asked.query_params)
 
 
 def _estimate_words(scene: str, form: RenderingForm) -> dict[str, str]:
-    found = previews().estimate(catalogue(), form.request(scene, "estimate-of-a-new-rendering"), usable_cores())
+    found = site().previews.estimate(catalogue(), form.request(scene, "estimate-of-a-new-rendering"), usable_cores())
     return {
         "tiles": translate("{tiles} tiles in {images} images", tiles=found["tiles"], images=found["images"]),
         "size": size(found["bytes"]),

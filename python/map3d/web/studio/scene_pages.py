@@ -4,9 +4,8 @@ import re
 from collections.abc import Mapping
 from typing import Any, Final
 
-from flask import Blueprint, request
-from werkzeug import Response
-from werkzeug.datastructures import MultiDict
+from starlette.datastructures import ImmutableMultiDict
+from starlette.responses import Response
 
 from map3d.catalogue import AssetRecord, RenderingRecord, SceneRecord
 from map3d.errors import BadRequest, CrsError, Map3dError, NotFound
@@ -19,8 +18,9 @@ from map3d.requests.json_values import from_json
 from map3d.scenes.build import is_stale
 from map3d.scenes.outliers import read_outliers
 from map3d.types import check_name
-from map3d.web.http.access import requires
-from map3d.web.http.current_app import catalogue, workspace
+from map3d.web.http.current import Fields, catalogue, request, workspace
+from map3d.web.http.guards import requires
+from map3d.web.http.routes import Routes
 from map3d.web.pages.tools import translate
 from map3d.web.studio.forms import form_values, more_controls
 from map3d.web.studio.operation_words import show_all
@@ -28,7 +28,7 @@ from map3d.web.studio.outlier_words import outlier_words
 from map3d.web.studio.report_words import missing_files, placing_words, summary_of
 from map3d.web.studio.shared import ask, check_typed_name, folder_choice, go_to, page
 
-scene_pages = Blueprint("scene_pages", __name__, url_prefix="/studio")
+scene_pages = Routes("scene_pages", "/studio")
 
 OPERATIONS: Final = 8
 MAX_IMPORT_BYTES: Final = 2 << 20
@@ -46,26 +46,26 @@ def home() -> Response:
 @scene_pages.get("/scenes/new")
 @requires("editor")
 def new_scene() -> Response:
-    return _new_scene_page(MultiDict(), "")
+    return _new_scene_page(ImmutableMultiDict(), "")
 
 
 @scene_pages.post("/scenes/new")
 @requires("editor")
 def send_new_scene() -> Response:
     try:
-        values = form_values(CreateScene, request.form)
+        values = form_values(CreateScene, request().form)
         name = values.setdefault("name", name_from(values.get("title", "")))
         create_scene(workspace(), catalogue(), from_json(CreateScene, values))
     except (BadRequest, CrsError) as error:
-        return _new_scene_page(request.form, str(error), 400)
+        return _new_scene_page(request().form, str(error), 400)
     return go_to(f"studio/scenes/{name}")
 
 
-def _new_scene_page(form: MultiDict[str, str], problem: str, status: int = 200) -> Response:
+def _new_scene_page(form: Fields, problem: str, status: int = 200) -> Response:
     return page("new_scene.html", status, form=form, problem=problem, more=more_controls(CreateScene, form))
 
 
-@scene_pages.get("/scenes/<scene>")
+@scene_pages.get("/scenes/{scene}")
 @requires("viewer")
 def scene_page(scene: str) -> Response:
     record = catalogue().scene(check_name(scene, "scene"))
@@ -74,23 +74,22 @@ def scene_page(scene: str) -> Response:
     values: dict[str, Any] = {"scene": record, "assets": assets, "operations": operations, "running": any(one.is_open for one in operations)}
     far = outlier_words(read_outliers(workspace(), scene), record) if assets else None
     stale = bool(assets) and is_stale(workspace(), catalogue(), scene)
-    more = more_controls(AddFiles, MultiDict())
+    more = more_controls(AddFiles, ImmutableMultiDict())
     return page("scene.html", **values, formats=_formats(), renderings=_listed_renderings(scene), stale=stale, far=far, more=more)
 
 
-@scene_pages.post("/scenes/<scene>/import")
+@scene_pages.post("/scenes/{scene}/import", most_bytes=MAX_IMPORT_BYTES)
 @requires("editor")
 def import_uploads(scene: str) -> Response:
     """Asks for the import of uploads, and for a build after it."""
-    request.max_content_length = request.max_form_memory_size = MAX_IMPORT_BYTES
     catalogue().scene(check_name(scene, "scene"))
-    options = form_values(AddFiles, request.form)
-    ask("import", scene, files=request.form.getlist("file"), options=options)
+    options = form_values(AddFiles, request().form)
+    ask("import", scene, files=request().form.getlist("file"), options=options)
     ask("build", scene)
     return go_to(f"studio/scenes/{scene}")
 
 
-@scene_pages.get("/scenes/<scene>/files/<asset>")
+@scene_pages.get("/scenes/{scene}/files/{asset}")
 @requires("viewer")
 def report(scene: str, asset: str) -> Response:
     record = _asset(scene, asset)
@@ -98,36 +97,36 @@ def report(scene: str, asset: str) -> Response:
     return page("report.html", scene=catalogue().scene(scene), asset=summary_of(record), lines=lines, missing=missing, placing=placing_words(record))
 
 
-@scene_pages.get("/scenes/<scene>/files/<asset>/remove")
+@scene_pages.get("/scenes/{scene}/files/{asset}/remove")
 @requires("editor")
 def remove_file(scene: str, asset: str) -> Response:
     record = _asset(scene, asset)
     return page("remove_file.html", scene=catalogue().scene(scene), asset=record, file=record.source.rsplit("/", 1)[-1])
 
 
-@scene_pages.post("/scenes/<scene>/files/<asset>/remove")
+@scene_pages.post("/scenes/{scene}/files/{asset}/remove")
 @requires("editor")
 def send_remove_file(scene: str, asset: str) -> Response:
     ask("remove", scene, what="files", names=[_asset(scene, asset).name])
     return go_to(f"studio/scenes/{scene}")
 
 
-@scene_pages.post("/scenes/<scene>/build")
+@scene_pages.post("/scenes/{scene}/build")
 @requires("editor")
 def build(scene: str) -> Response:
     """Asks for a build; with `keep_outliers` or `cluster` (0: the largest) in the form, of what they choose."""
     catalogue().scene(check_name(scene, "scene"))
-    ask("build", scene, **_choice(request.form))
+    ask("build", scene, **_choice(request().form))
     return go_to(f"studio/scenes/{scene}")
 
 
-@scene_pages.get("/scenes/<scene>/remove")
+@scene_pages.get("/scenes/{scene}/remove")
 @requires("editor")
 def remove(scene: str) -> Response:
     return _removal_page(scene)
 
 
-@scene_pages.post("/scenes/<scene>/remove")
+@scene_pages.post("/scenes/{scene}/remove")
 @requires("editor")
 def send_remove(scene: str) -> Response:
     catalogue().scene(check_name(scene, "scene"))
@@ -135,7 +134,7 @@ def send_remove(scene: str) -> Response:
         check_typed_name(scene)
     except BadRequest as error:
         return _removal_page(scene, str(error), 400)
-    ask("remove", scene, what="scene", with_renderings=True, folders=request.form.getlist("published"))
+    ask("remove", scene, what="scene", with_renderings=True, folders=request().form.getlist("published"))
     return go_to("studio/")
 
 

@@ -4,11 +4,10 @@ Each is available under /tiles/<rendering>/ and under /view/<rendering>/, where 
 """
 
 import re
-from hashlib import sha256
 from pathlib import Path
 from typing import Final
 
-from flask import Blueprint, Response, request
+from starlette.responses import Response
 
 from map3d.errors import NotFound
 from map3d.registry import Registry
@@ -17,11 +16,13 @@ from map3d.scenes.scene_cache import scene_in_use
 from map3d.tiles.manifest import FILE_NAME
 from map3d.tiles.track_stores import read_manifest
 from map3d.types import check_name
-from map3d.web.http.compression import compress
-from map3d.web.http.current_app import catalogue, workspace
+from map3d.web.http.current import catalogue, workspace
+from map3d.web.http.responses import document as respond
+from map3d.web.http.routes import Routes
 from map3d.web.tiles.object_documents import Build, ObjectDocuments
 
-documents = Blueprint("documents", __name__)
+documents = Routes("documents")
+_JSON: Final = "application/json"
 
 _SHARD: Final = re.compile(r"0|[1-9][0-9]{0,6}", re.ASCII)
 """Shard numbers have at most seven digits, because ids have 32 bits."""
@@ -34,13 +35,13 @@ _BUILDS: Final[dict[re.Pattern[str], Build]] = {
 _object_documents: Final = ObjectDocuments()
 
 
-@documents.get(f"/tiles/<rendering>/{FILE_NAME}")
-@documents.get(f"/view/<rendering>/{FILE_NAME}")
+@documents.get(f"/tiles/{{rendering}}/{FILE_NAME}")
+@documents.get(f"/view/{{rendering}}/{FILE_NAME}")
 def manifest(rendering: str) -> Response:
     data = read_manifest(workspace(), catalogue().rendering(check_name(rendering, "rendering")))
     if data is None:
         raise NotFound(f"rendering {rendering!r} has no tiles yet; run: map3d render {rendering}")
-    return json_response(data)
+    return respond(data, _JSON)
 
 
 def shard(rendering: str, shard: str) -> Response:
@@ -48,13 +49,11 @@ def shard(rendering: str, shard: str) -> Response:
     if not _SHARD.fullmatch(shard):
         raise NotFound(f"no shard {shard[:64]!r}; shard names are plain numbers")
     with Registry(registry_path(rendering)) as objects:
-        return json_response(dump_document(objects.shard(int(shard))))
+        return respond(dump_document(objects.shard(int(shard))), _JSON)
 
 
-@documents.get("/tiles/<rendering>/objects/<document>.json")
-@documents.get("/view/<rendering>/objects/<document>.json")
-@documents.get("/tiles/<rendering>/objects/<path:document>.json")
-@documents.get("/view/<rendering>/objects/<path:document>.json")
+@documents.get("/tiles/{rendering}/objects/{document:path}.json")
+@documents.get("/view/{rendering}/objects/{document:path}.json")
 def object_document(rendering: str, document: str) -> Response:
     """Returns a document of the search index or of the attribute columns, or an attribute shard."""
     if document not in ("search", "attributes") and "/" not in document:
@@ -63,7 +62,7 @@ def object_document(rendering: str, document: str) -> Response:
     data = None if build is None else _object_documents.get(registry_path(rendering), build, f"objects/{document}.json")
     if data is None:
         raise NotFound(f"no document {document[:64]!r}; search.json and attributes.json in objects/ lead to all others")
-    return json_response(data)
+    return respond(data, _JSON)
 
 
 def registry_path(rendering: str) -> Path:
@@ -76,12 +75,3 @@ def registry_path(rendering: str) -> Path:
     if not path.is_file():
         raise NotFound(f"the scene of rendering {rendering!r} has no objects yet; run: map3d add-files")
     return path
-
-
-def json_response(data: bytes) -> Response:
-    """Returns the document with an ETag that clients revalidate on each request; compressed if the client accepts it."""
-    response = Response(data, mimetype="application/json")
-    response.set_etag(sha256(data).hexdigest()[:32], weak=True)
-    response.headers["Cache-Control"] = "no-cache"
-    response.make_conditional(request)
-    return compress(response)

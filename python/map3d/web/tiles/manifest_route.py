@@ -1,27 +1,30 @@
-"""Manifests from memory: plain ASGI, because every visitor fetches one first, and a framework costs too much. Flask answers what is not in memory."""
+"""Manifests from memory: plain ASGI, because every visitor fetches one first. A view function answers what is not a file of the workspace."""
 
 import asyncio
 import os
 import time
 from collections import OrderedDict
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from hashlib import sha256
 from typing import Final
 
 from map3d.catalogue import Workspace
 from map3d.errors import Map3dError
-from map3d.publish.page_head import VIEWER_POLICY
 from map3d.tiles.manifest import FILE_NAME
 from map3d.tiles.track_stores import rendering_record, tiles_url
-from map3d.web.http.compression import MIN_BYTES, gzip_bytes
+from map3d.web.http.accepting import accepts_gzip
+from map3d.web.http.asgi import EMPTY, Application, Headers, Messages, Receive, Scope, Send
+from map3d.web.http.conditions import etag_matches, header, without_body
+from map3d.web.http.headers import NO_CACHE, TILES, page_headers
 from map3d.web.http.open_stores import RECHECK_S
-from map3d.web.tiles.tile_route import PREFIXES, Headers, Messages, Receive, Scope, Send, etag_matches
+from map3d.web.http.responses import MIN_BYTES, gzip_bytes
+from map3d.web.tiles.tile_route import KeptResponse
 
 MOST_MANIFESTS: Final = 64
 MOST_BYTES: Final = 8 << 20
 """Larger manifests are not kept."""
+
+_COMMON: Final = [*page_headers("/view/"), (b"cache-control", NO_CACHE), (b"vary", b"Accept-Encoding")]
 
 FileState = tuple[int, int, int]
 """(inode, time of change, size)."""
@@ -32,17 +35,8 @@ class _Manifest:
     path: str
     state: FileState
     read_s: float
-    etag: bytes
-    plain: bytes
-    packed: bytes | None
-
-    @cached_property
-    def whole(self) -> Messages:
-        return _messages(self.etag, self.plain)
-
-    @cached_property
-    def whole_packed(self) -> Messages | None:
-        return None if self.packed is None else _messages(self.etag, self.packed, ((b"content-encoding", b"gzip"),))
+    plain: KeptResponse
+    packed: KeptResponse | None
 
     def is_current(self) -> bool:
         return _state(self.path) == self.state
@@ -54,29 +48,30 @@ Reading = asyncio.Future[_Manifest | None]
 class ManifestRoute:
     """Belongs to one event loop, except `find_cached`."""
 
-    def __init__(self, workspace: Workspace) -> None:
-        self._workspace = workspace
+    def __init__(self, workspace: Workspace, otherwise: Application) -> None:
+        """`otherwise` answers requests for a manifest that is not a file of the workspace, or too large."""
+        self._workspace, self._otherwise = workspace, otherwise
         self._known: OrderedDict[str, _Manifest] = OrderedDict()
         self._readings: dict[str, Reading] = {}
 
-    def matches(self, path: str, method: str) -> bool:
+    def answers(self, scope: Scope) -> bool:
         """Whether the path is that of a manifest, and the method one that reads it."""
-        return path.endswith(f"/{FILE_NAME}") and path.startswith(PREFIXES) and path.count("/") == 3 and method in ("GET", "HEAD")
+        path = scope["path"]
+        return path.endswith(f"/{FILE_NAME}") and path.startswith(TILES) and path.count("/") == 3 and scope["method"] in ("GET", "HEAD")
 
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> bool:
-        """Answers the request; returns False, without an answer, for a manifest that is not a file of the workspace."""
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         name = scope["path"].split("/")[2]
         found = self._find_known(name) or await self._read_shared(name)
         if found is None:
-            return False
+            await self._otherwise(scope, receive, send)
+            return
         for message in _answer(found, scope):
             await send(message)
-        return True
 
     def find_cached(self, scope: Scope) -> Messages | None:
         """Returns the answer to a request for a manifest that is in memory and was lately compared with the catalogue; None for all other requests.
         Any thread may call it."""
-        if not self.matches(scope["path"], scope["method"]):
+        if not self.answers(scope):
             return None
         found = self._find_known(scope["path"].split("/")[2])
         return None if found is None else _answer(found, scope)
@@ -127,8 +122,14 @@ class ManifestRoute:
             return None
         if state is None or state != _state(str(path)) or len(data) > MOST_BYTES:
             return None
-        etag = b'W/"%s"' % sha256(data).hexdigest()[:32].encode()
-        return _Manifest(str(path), state, time.monotonic(), etag, data, gzip_bytes(data) if len(data) >= MIN_BYTES else None)
+        headers = [*_COMMON, (b"etag", b'W/"%s"' % sha256(data).hexdigest()[:32].encode())]
+        packed = None if len(data) < MIN_BYTES else _kept([*headers, (b"content-encoding", b"gzip")], gzip_bytes(data))
+        return _Manifest(str(path), state, time.monotonic(), _kept(headers, data), packed)
+
+
+def _kept(headers: Headers, body: bytes) -> KeptResponse:
+    length = (b"content-length", str(len(body)).encode())
+    return KeptResponse(200, [*headers, (b"content-type", b"application/json"), length], body, header(headers, b"etag"))
 
 
 def _answer(found: _Manifest, scope: Scope) -> Messages:
@@ -138,35 +139,10 @@ def _answer(found: _Manifest, scope: Scope) -> Messages:
             accepted = value
         elif name == b"if-none-match":
             if_none_match = value
-    if if_none_match and etag_matches(if_none_match, found.etag.removeprefix(b"W/")):
-        return _messages(found.etag, None)
-    start, body = (found.whole_packed if _accepts_gzip(accepted) else None) or found.whole
-    return (start, body if scope["method"] == "GET" else {"type": "http.response.body", "body": b""})
-
-
-def _messages(etag: bytes, body: bytes | None, more: Sequence[tuple[bytes, bytes]] = ()) -> Messages:
-    """Returns the answer with a body, or that the client has it already."""
-    headers: Headers = [
-        (b"etag", etag),
-        (b"cache-control", b"no-cache"),
-        (b"vary", b"Accept-Encoding"),
-        (b"access-control-allow-origin", b"*"),
-        (b"x-content-type-options", b"nosniff"),
-        (b"content-security-policy", VIEWER_POLICY.encode()),
-        (b"referrer-policy", b"same-origin"),
-        *more,
-    ]
-    if body is not None:
-        headers += [(b"content-type", b"application/json"), (b"content-length", str(len(body)).encode())]
-    return (
-        {"type": "http.response.start", "status": 304 if body is None else 200, "headers": headers},
-        {"type": "http.response.body", "body": body or b""},
-    )
-
-
-def _accepts_gzip(accepted: bytes) -> bool:
-    """Takes any weight of gzip below 1 for a refusal, which is never wrong."""
-    return accepted != b"" and any(part.strip().lower() in (b"gzip", b"*", b"gzip;q=1") for part in accepted.replace(b" ", b"").split(b","))
+    if if_none_match and etag_matches(if_none_match, found.plain.etag):
+        return KeptResponse(304, without_body(found.plain.headers), b"").messages
+    start, body = ((found.packed if accepts_gzip(accepted.decode("latin-1")) else None) or found.plain).messages
+    return (start, body if scope["method"] == "GET" else EMPTY)
 
 
 def _state(path: str) -> FileState | None:

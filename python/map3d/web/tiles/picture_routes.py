@@ -7,7 +7,7 @@ from typing import Final
 from urllib.parse import quote
 
 import segno
-from flask import Blueprint, Response, current_app, request
+from starlette.responses import Response
 
 from map3d.errors import BadRequest, NotFound, Unavailable
 from map3d.tile_services.picture import draw_picture
@@ -16,17 +16,17 @@ from map3d.tiles.manifest import Manifest
 from map3d.tiles.track_stores import read_manifest
 from map3d.types import Layer, TileId, check_name
 from map3d.web.http.byte_lru import ByteLru
-from map3d.web.http.current_app import catalogue, workspace
-from map3d.web.http.open_stores import OpenStores
+from map3d.web.http.current import catalogue, request, site, workspace
 from map3d.web.http.public_url import public_url
+from map3d.web.http.responses import is_known, revalidated
+from map3d.web.http.routes import Routes
 
-pictures = Blueprint("pictures", __name__)
+pictures = Routes("pictures")
 
-STORES: Final = "map3d.picture_stores"
 AT_ONCE: Final = 2
 """Pictures that a process draws at the same time."""
 QUEUE: Final = 4
-"""Requests that are drawn or wait; further ones are refused, so that pictures never take all of Flask's threads."""
+"""Requests that are drawn or wait; further ones are refused, so that pictures never take all threads."""
 RETRY_S: Final = 5
 CACHE_BYTES: Final = 32 << 20
 QR_SCALE: Final = 8
@@ -36,36 +36,29 @@ _drawing: Final = threading.Semaphore(AT_ONCE)
 _queue: Final = threading.Semaphore(QUEUE)
 
 
-@pictures.get("/<rendering>/static/<where>/<size>")
-@pictures.get("/pictures/<rendering>/<where>/<size>")
+@pictures.get("/{rendering}/static/{where}/{size}")
+@pictures.get("/pictures/{rendering}/{where}/{size}")
 def picture(rendering: str, where: str, size: str) -> Response:
     """Returns a picture. The second address also works for a rendering whose name begins other addresses of the server, such as `view`."""
     data, manifest = _manifest(rendering)
-    asked = parse_picture(manifest, where, size, request.args.get("style"), request.args.get("t"))
+    asked = parse_picture(manifest, where, size, request().query_params.get("style"), request().query_params.get("t"))
     key = sha256(f"{rendering}/{asked.address}\n".encode() + data).hexdigest()[:32]
-    response = Response(mimetype=asked.media_type)
-    response.set_etag(key)
-    response.headers["Cache-Control"] = "no-cache"
-    response.headers["Content-Location"] = public_url(f"pictures/{rendering}/{asked.address}")
-    if key not in request.if_none_match:
-        response.set_data(_draw(key, rendering, manifest, asked))
-    response.make_conditional(request)
-    return response
+    etag = f'"{key}"'
+    drawn = b"" if is_known(etag) else _draw(key, rendering, manifest, asked)
+    return revalidated(drawn, asked.media_type, etag, {"Content-Location": public_url(f"pictures/{rendering}/{asked.address}")})
 
 
-@pictures.get("/view/<rendering>/qr.svg")
+@pictures.get("/view/{rendering}/qr.svg")
 def qr_code(rendering: str) -> Response:
     """Returns a QR code of the link to a view as SVG."""
     _, manifest = _manifest(rendering)
-    link = request.args.get("view", "")
+    link = request().query_params.get("view", "")
     parse_link(manifest, link, (1, 1), "image/png")
     out = io.BytesIO()
     segno.make(link_url(rendering, link), error="m", micro=False).save(
         out, kind="svg", scale=QR_SCALE, border=4, dark="#000", light="#fff", title=rendering
     )
-    response = Response(out.getvalue(), mimetype="image/svg+xml")
-    response.headers["Cache-Control"] = "no-cache"
-    return response
+    return Response(out.getvalue(), 200, {"Cache-Control": "no-cache"}, "image/svg+xml; charset=utf-8")
 
 
 def link_url(rendering: str, link: str) -> str:
@@ -101,10 +94,9 @@ class _TileReader:
     """Reads the tiles of a view from the stores of its tracks."""
 
     def __init__(self, rendering: str, asked: PictureRequest) -> None:
-        stores: OpenStores = current_app.extensions[STORES]
         self._layers = {
             name: (opened.store, number)
-            for opened in stores.stores_of_view(rendering, asked.view.frame.id)
+            for opened in site().stores.stores_of_view(rendering, asked.view.frame.id)
             for name, (number, _) in opened.layers.items()
         }
 

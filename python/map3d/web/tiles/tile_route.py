@@ -2,17 +2,18 @@
 
 import asyncio
 import logging
-import re
 import threading
 import time
-from collections.abc import Awaitable, Callable, Iterable, MutableMapping
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final, TypeVar
+from typing import Final, TypeVar
 
-from map3d.catalogue import Job, Workspace
+from starlette.exceptions import HTTPException
+
+from map3d.catalogue import Job
 from map3d.errors import Unavailable
 from map3d.jobs.on_demand.block_requests import BUSY_RETRY_S
 from map3d.jobs.on_demand.on_demand import OnDemand
@@ -20,38 +21,23 @@ from map3d.tiles.decode_tile import as_layer
 from map3d.tiles.naming import block_of, parse_tile
 from map3d.tiles.tile_store import StoredBlock, content_hash
 from map3d.types import TileId
+from map3d.web.http.asgi import EMPTY, Headers, Messages, Receive, Scope, Send
 from map3d.web.http.byte_lru import ByteLru
-from map3d.web.http.http_errors import retry_headers, status_of
+from map3d.web.http.conditions import CONDITIONS, etag_matches, find_range, header, range_headers, without_body
+from map3d.web.http.headers import ANY_ORIGIN, IMMUTABLE, NO_CACHE, NO_STORE, TILES, raw
+from map3d.web.http.http_errors import not_allowed, plain_error
 from map3d.web.http.open_stores import FoundLayer, OpenStore, OpenStores
 from map3d.web.http.settings import DEFAULT_CACHE_BYTES
+from map3d.web.http.shared_catalogue import SharedCatalogue
 
-Scope = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
-Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
-Headers = list[tuple[bytes, bytes]]
-Messages = tuple[MutableMapping[str, Any], MutableMapping[str, Any]]
-"""The start and the body of a response."""
 Given = TypeVar("Given")
 Found = TypeVar("Found")
-
-PREFIXES: Final = ("/tiles/", "/view/")
-"""The viewer's page loads tiles relative to its own folder, hence the second one."""
 
 READING_THREADS: Final = 4
 WAIT_S: Final = 20.0
 """How long a request waits for a block that is rendered on demand."""
-IMMUTABLE: Final = b"public, max-age=31536000, immutable"
-NO_CACHE: Final = b"no-cache"
-NO_STORE: Final = b"no-store"
-COMMON: Final[Headers] = [
-    (b"access-control-allow-origin", b"*"),
-    (b"x-content-type-options", b"nosniff"),
-    (b"cross-origin-resource-policy", b"cross-origin"),
-]
-
+COMMON: Final = raw(ANY_ORIGIN)
 ACCEPT_RANGES: Final = (b"accept-ranges", b"bytes")
-CONDITIONS: Final = frozenset((b"if-none-match", b"range"))
-_RANGE: Final = re.compile(rb"bytes=([0-9]{0,15})-([0-9]{0,15})")
 
 log: Final = logging.getLogger("map3d.web")
 
@@ -68,8 +54,8 @@ class TileUrl:
 
 
 @dataclass(frozen=True)
-class TileResponse:
-    """The same for every client. `etag` is empty for responses without a tile; only immutable responses have a `source`."""
+class KeptResponse:
+    """A response in memory, the same for every client. `etag` is empty for responses without a tile; only immutable ones have a `source`."""
 
     status: int
     headers: Headers
@@ -77,20 +63,12 @@ class TileResponse:
     etag: bytes = b""
     source: OpenStore | None = None
 
-    @property
-    def is_stored(self) -> bool:
-        """Whether the tile's block is stored, be the tile empty or not."""
-        return (b"cache-control", NO_STORE) not in self.headers
-
     @cached_property
-    def whole(self) -> Messages:
-        return self.messages(head=False)
-
-    def messages(self, *, head: bool) -> Messages:
-        """Returns the response as ASGI messages."""
+    def messages(self) -> Messages:
+        """The response as ASGI messages."""
         return (
             {"type": "http.response.start", "status": self.status, "headers": self.headers},
-            {"type": "http.response.body", "body": b"" if head else self.body},
+            {"type": "http.response.body", "body": self.body},
         )
 
 
@@ -104,58 +82,57 @@ def parse_tile_url(path: str, query: bytes) -> TileUrl | None:
     return None if tile is None else TileUrl(rendering, view, layer, tile, _parse_version(query))
 
 
-def etag_matches(if_none_match: bytes, etag: bytes) -> bool:
-    """Weak comparison, RFC 9110 §13.1.2."""
-    if not etag:
-        return False
-    tags = [tag.strip().removeprefix(b"W/") for tag in if_none_match.split(b",")]
-    return b"*" in tags or etag in tags
-
-
 class TileRoute:
     """Serves the tiles of a workspace. Belongs to one event loop, except `find_cached`; several processes may serve the same workspace."""
 
-    def __init__(self, workspace: Workspace, cache_bytes: int = DEFAULT_CACHE_BYTES, on_demand: OnDemand | None = None) -> None:
+    def __init__(self, catalogue: SharedCatalogue, cache_bytes: int = DEFAULT_CACHE_BYTES, on_demand: OnDemand | None = None) -> None:
         """`on_demand` renders the blocks that are missing or stale."""
-        self.stores = OpenStores(workspace) if on_demand is None else OpenStores(workspace, on_demand.epoch)
+        self.stores = OpenStores(catalogue) if on_demand is None else OpenStores(catalogue, on_demand.epoch)
         self.on_demand = on_demand
         self.cache_hits = 0
-        self.cache: ByteLru[tuple[str, bytes], TileResponse] = ByteLru(cache_bytes)
+        self.cache: ByteLru[tuple[str, bytes], KeptResponse] = ByteLru(cache_bytes)
         self._cache_lock = threading.Lock()
         self._readers = ThreadPoolExecutor(READING_THREADS, thread_name_prefix="tiles")
 
-    def matches(self, path: str) -> bool:
+    def answers(self, scope: Scope) -> bool:
         """Whether the path is a tile URL, well-formed or not."""
-        return path.startswith(PREFIXES) and path.count("/") == 7
+        path: str = scope["path"]
+        return path.startswith(TILES) and path.count("/") == 7
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["method"] not in ("GET", "HEAD"):
-            await _send(send, _error(405, "method not allowed; use GET or HEAD", [(b"allow", b"GET, HEAD")]), head=False)
-            return
-        key = _cache_key(scope)
+            response = _error_response(not_allowed("GET", "HEAD"))
+        else:
+            response = for_client(await self.find(_cache_key(scope), receive), scope)
+        for message in response.messages:
+            await send(message)
+
+    async def find(self, key: tuple[str, bytes], receive: Receive) -> KeptResponse:
+        """`key`: the path of a tile without its first part, and the query."""
         response = self._get_cached(key, OpenStore.is_current)
         if response is None:
             response = await self._respond(*key, receive)
             if response.source and b"&" not in key[1]:
                 with self._cache_lock:
                     self.cache.put(key, response, len(response.body))
-        await _send(send, _for_client(response, scope), head=scope["method"] == "HEAD")
+        return response
 
     def find_cached(self, scope: Scope) -> Messages | None:
         """Returns the answer to a request for a tile that is in memory and was lately compared with its store, without I/O; None for all other
         requests. Any thread may call it. All requests of the process pass here first, so it is short."""
         method, path = scope["method"], scope["path"]
-        if not path.startswith(PREFIXES) or (method != "GET" and method != "HEAD"):
+        if not path.startswith(TILES) or (method != "GET" and method != "HEAD"):
             return None
         response = self._get_cached((path[path.index("/", 1) :], scope["query_string"]), OpenStore.is_fresh)
         if response is None:
             return None
         for name, _ in scope["headers"]:
             if name in CONDITIONS:
-                return _for_client(response, scope).messages(head=method == "HEAD")
-        return response.whole if method == "GET" else response.messages(head=True)
+                response = for_client(response, scope)
+                break
+        return response.messages if method == "GET" else (response.messages[0], EMPTY)
 
-    def _get_cached(self, key: tuple[str, bytes], is_valid: Callable[[OpenStore, float], bool]) -> TileResponse | None:
+    def _get_cached(self, key: tuple[str, bytes], is_valid: Callable[[OpenStore, float], bool]) -> KeptResponse | None:
         with self._cache_lock:
             response = self.cache.get(key)
             if response is None or response.source is None or not is_valid(response.source, time.monotonic()):
@@ -167,11 +144,11 @@ class TileRoute:
         self._readers.shutdown(cancel_futures=True)
         self.stores.close()
 
-    async def _respond(self, path: str, query: bytes, receive: Receive) -> TileResponse:
+    async def _respond(self, path: str, query: bytes, receive: Receive) -> KeptResponse:
         url = parse_tile_url(path, query)
-        if url is None:
-            return _error(404, "not a tile URL; expected /tiles/<rendering>/<view>/<layer>/<z>/<x>/<y> with 0 ≤ x, y < 2^z")
         try:
+            if url is None:
+                raise HTTPException(404, "not a tile URL; expected /tiles/<rendering>/<view>/<layer>/<z>/<x>/<y> with 0 ≤ x, y < 2^z")
             found = await self._run(self._read, url)
             if isinstance(found, Job):
                 await self._wait_for(found, receive)
@@ -180,7 +157,7 @@ class TileRoute:
                 raise Unavailable(f"block {found.block} was removed again; try again in 1 s", 1)
             return found
         except Exception as error:
-            return _error(*status_of(error), [(name.lower().encode(), value.encode()) for name, value in retry_headers(error).items()])
+            return _error_response(error)
 
     async def _run(self, function: Callable[[Given], Found], given: Given) -> Found:
         return await asyncio.get_running_loop().run_in_executor(self._readers, function, given)
@@ -203,7 +180,7 @@ class TileRoute:
             raise Unavailable(f"block {job.block} of track {job.track} is being rendered; try again in {BUSY_RETRY_S} s", BUSY_RETRY_S)
         ended.result()
 
-    def _read(self, url: TileUrl) -> TileResponse | Job:
+    def _read(self, url: TileUrl) -> KeptResponse | Job:
         """Returns the stored tile, or the open job of a block that is not stored. A stored block whose job is open is rendered meanwhile."""
         found = None if self.on_demand is None else self.on_demand.find_track(url.rendering, url.view, url.layer)
         block = block_of(url.tile, found[0].zmax) if found is not None and url.tile.z <= found[0].zmax else None
@@ -220,26 +197,27 @@ class TileRoute:
                 self.on_demand.ask(job, keep=True)
         return stale or job
 
-    def _read_stale(self, url: TileUrl) -> TileResponse | None:
+    def _read_stale(self, url: TileUrl) -> KeptResponse | None:
         """Returns a tile that clients revalidate each time; None if its block is not stored."""
         found = self.stores.find_layer(url.rendering, url.view, url.layer)
         response = None if found is None else _read_from(found, url, is_stale=True)
-        return response if response is not None and response.is_stored else None
+        return None if response is None or (b"cache-control", NO_STORE) in response.headers else response
 
-    def _read_stored(self, url: TileUrl) -> TileResponse:
+    def _read_stored(self, url: TileUrl) -> KeptResponse:
+        """Raises HTTPException for what no store has."""
         found = self.stores.find_layer(url.rendering, url.view, url.layer)
         if found is not None:
             return _read_from(found, url)
         names = self.stores.layer_names(url.rendering, url.view)
         if names:
-            return _error(404, f"no layer {url.layer[:64]!r}; the layers are {', '.join(names)}")
-        return _error(404, f"no rendering {url.rendering[:64]!r} with view {url.view[:64]!r}")
+            raise HTTPException(404, f"no layer {url.layer[:64]!r}; the layers are {', '.join(names)}")
+        raise HTTPException(404, f"no rendering {url.rendering[:64]!r} with view {url.view[:64]!r}")
 
 
-def _read_from(found: FoundLayer, url: TileUrl, *, is_stale: bool = False) -> TileResponse:
+def _read_from(found: FoundLayer, url: TileUrl, *, is_stale: bool = False) -> KeptResponse:
     opened, shape = found.opened, found.opened.store.shape
     if url.tile.z > shape.zmax:
-        return _error(404, f"no level {url.tile.z}; the deepest level is {shape.zmax}")
+        raise HTTPException(404, f"no level {url.tile.z}; the deepest level is {shape.zmax}")
     root = block_of(url.tile, shape.zmax)
     before = opened.store.get_block(root)
     data = opened.store.get_tile(found.number, *url.tile)
@@ -266,34 +244,22 @@ def _cache_key(scope: Scope) -> tuple[str, bytes]:
     return scope["path"][scope["path"].index("/", 1) :], scope["query_string"]
 
 
-def _for_client(response: TileResponse, scope: Scope) -> TileResponse:
-    if response.etag:
-        for name, _ in scope["headers"]:
-            if name in CONDITIONS:
-                return _apply_conditions(response, scope["headers"], is_get=scope["method"] == "GET")
-    return response
-
-
-def _apply_conditions(response: TileResponse, headers: Headers, *, is_get: bool) -> TileResponse:
-    """Answers requests with If-None-Match, and those with one range (RFC 9110 §13.1.2, §13.1.5, §14.2)."""
-    if etag_matches(_header(headers, b"if-none-match"), response.etag):
-        return TileResponse(304, [pair for pair in response.headers if pair[0] not in (b"content-length", b"content-type")], b"")
-    found = _RANGE.fullmatch(_header(headers, b"range"))
-    if not is_get or found is None or _header(headers, b"if-range") not in (b"", response.etag):
+def for_client(response: KeptResponse, scope: Scope) -> KeptResponse:
+    """Answers requests with If-None-Match, and those with one range."""
+    headers = scope["headers"]
+    if not response.etag or not any(name in CONDITIONS for name, _ in headers):
         return response
+    if etag_matches(header(headers, b"if-none-match"), response.etag):
+        return KeptResponse(304, without_body(response.headers), b"")
     size = len(response.body)
-    first, last = int(found[1] or -1), int(found[2] or -1)
-    start, stop = (max(size - last, 0), size) if first < 0 else (first, min(last, size - 1) + 1 if last >= 0 else size)
-    if (first < 0 and last < 0) or 0 <= last < first:
-        return response
-    kept = [pair for pair in response.headers if pair[0] != b"content-length"]
-    if start >= size or start >= stop:
-        return _error(416, "the range is not in the tile", [(b"content-range", b"bytes */%d" % size)])
-    head = [(b"content-range", b"bytes %d-%d/%d" % (start, stop - 1, size)), (b"content-length", b"%d" % (stop - start))]
-    return TileResponse(206, kept + head, response.body[start:stop])
+    try:
+        found = find_range(headers, response.etag, size) if scope["method"] == "GET" else None
+    except HTTPException as error:
+        return _error_response(error)
+    return response if found is None else KeptResponse(206, range_headers(response.headers, *found, size), response.body[slice(*found)])
 
 
-def _tile_response(data: bytes, media_type: str, caching: bytes, source: OpenStore | None) -> TileResponse:
+def _tile_response(data: bytes, media_type: str, caching: bytes, source: OpenStore | None) -> KeptResponse:
     etag = b'"%s"' % content_hash(data).hex().encode()
     length = str(len(data)).encode()
     headers = [
@@ -304,32 +270,22 @@ def _tile_response(data: bytes, media_type: str, caching: bytes, source: OpenSto
         ACCEPT_RANGES,
         *COMMON,
     ]
-    return TileResponse(200, headers, data, etag, source)
+    return KeptResponse(200, headers, data, etag, source)
 
 
-def _empty_response(caching: bytes, source: OpenStore | None) -> TileResponse:
-    return TileResponse(204, [(b"cache-control", caching), *COMMON], b"", source=source)
+def _empty_response(caching: bytes, source: OpenStore | None) -> KeptResponse:
+    return KeptResponse(204, [(b"cache-control", caching), *COMMON], b"", source=source)
 
 
-def _error(status: int, text: str, more: Iterable[tuple[bytes, bytes]] = ()) -> TileResponse:
-    body = (text + "\n").encode()
-    headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"content-length", str(len(body)).encode()), (b"cache-control", NO_STORE)]
-    return TileResponse(status, [*headers, *COMMON, *more], body)
+def _error_response(error: Exception) -> KeptResponse:
+    response = plain_error(error, ANY_ORIGIN)
+    return KeptResponse(response.status_code, response.raw_headers, bytes(response.body))
 
 
 async def _disconnected(receive: Receive) -> None:
     """Returns when the client has gone away."""
     while (await receive())["type"] != "http.disconnect":
         pass
-
-
-async def _send(send: Send, response: TileResponse, *, head: bool) -> None:
-    for message in response.messages(head=head):
-        await send(message)
-
-
-def _header(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> bytes:
-    return b",".join(value for key, value in headers if key == name)
 
 
 def _parse_version(query: bytes) -> int | None:

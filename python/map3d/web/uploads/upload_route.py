@@ -1,6 +1,6 @@
 """Uploads by the tus protocol 1.0.0 (https://tus.io): core, creation, creation-with-upload, termination, expiration, checksum.
 
-Plain ASGI, because an upload of many gigabytes must not hold one of the threads of Flask. Pieces go to the disk as they arrive; memory stays bounded.
+Plain ASGI, because an upload of many gigabytes must not hold a thread. Pieces go to the disk as they arrive; memory stays bounded.
 """
 
 import asyncio
@@ -12,16 +12,19 @@ import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from email.utils import formatdate
-from http.cookies import CookieError, SimpleCookie
 from typing import Any, Final, TypeVar
+
+from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection
+from starlette.responses import Response
 
 from map3d.catalogue import Workspace
 from map3d.errors import BadRequest
-from map3d.uploads import ChecksumMismatch, DiskFull, OffsetConflict, Upload, Uploads, UploadWriter, WriteInProgress
+from map3d.uploads import ChecksumMismatch, Upload, Uploads, UploadWriter
 from map3d.uploads.upload_limits import limits_from_environment
 from map3d.web.http.access import COOKIE, CSRF_HEADER, AccessControl
-from map3d.web.http.http_errors import status_of
-from map3d.web.tiles.tile_route import Receive, Scope, Send
+from map3d.web.http.asgi import Receive, Scope, Send
+from map3d.web.http.http_errors import not_allowed, plain_error
 
 PATH: Final = "/uploads/"
 VERSION: Final = "1.0.0"
@@ -39,17 +42,9 @@ MAX_METADATA: Final = 8_192
 METHODS: Final = ("OPTIONS", "POST", "HEAD", "PATCH", "DELETE")
 
 _NUMBER: Final = re.compile(r"0|[1-9][0-9]{0,17}", re.ASCII)
-_STATUS: Final[Mapping[type[Exception], int]] = {OffsetConflict: 409, WriteInProgress: 423, ChecksumMismatch: 460, DiskFull: 507}
+COMMON: Final = {"Tus-Resumable": VERSION, "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff"}
 
 Result = TypeVar("Result")
-
-
-class _Refused(Exception):
-    """An error response of this route."""
-
-    def __init__(self, status: int, text: str, headers: Mapping[str, str] | None = None) -> None:
-        super().__init__(text)
-        self.status, self.text, self.headers = status, text, headers or {}
 
 
 class UploadRoute:
@@ -64,27 +59,22 @@ class UploadRoute:
         self._writes = 0
         self._cleaned_s = float("-inf")
 
-    def matches(self, path: str) -> bool:
-        return path.startswith(PATH)
+    def answers(self, scope: Scope) -> bool:
+        return bool(scope["path"].startswith(PATH))
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        headers = {key.decode("latin-1").lower(): value.decode("latin-1") for key, value in scope["headers"]}
         try:
-            status, more = await self._answer(scope["method"], scope["path"][len(PATH) :], headers, receive)
-            text = ""
-        except _Refused as error:
-            status, text, more = error.status, error.text, dict(error.headers)
+            status, more = await self._answer(scope["method"], scope["path"][len(PATH) :], HTTPConnection(scope), receive)
+            response = Response(status_code=status, headers={**COMMON, **more})
         except Exception as error:
-            status, text = _STATUS.get(type(error), 0), str(error)
-            if not status:
-                status, text = status_of(error)
-            more = {}
-        await _respond(send, status, text, more, head=scope["method"] == "HEAD")
+            response = plain_error(error, COMMON)
+        await response(scope, receive, send)
 
     async def close(self) -> None:
         self._threads.shutdown(cancel_futures=True)
 
-    async def _answer(self, method: str, id: str, headers: Mapping[str, str], receive: Receive) -> tuple[int, dict[str, str]]:
+    async def _answer(self, method: str, id: str, request: HTTPConnection, receive: Receive) -> tuple[int, dict[str, str]]:
+        headers = request.headers
         if method == "OPTIONS":
             size = str(self.uploads.limits.quota_bytes)
             more = {"Tus-Version": VERSION, "Tus-Extension": EXTENSIONS, "Tus-Max-Size": size, "Tus-Checksum-Algorithm": ",".join(ALGORITHMS)}
@@ -92,10 +82,10 @@ class UploadRoute:
         if method == "POST" and id and "x-http-method-override" in headers:
             method = headers["x-http-method-override"].upper()
         if method not in (("POST",) if not id else ("HEAD", "PATCH", "DELETE")):
-            raise _Refused(405, "method not allowed", {"Allow": ", ".join(METHODS)})
-        user = await self._run(self._check, method, headers)
+            raise not_allowed(*METHODS)
+        user = await self._run(self._check, method, request)
         if headers.get("tus-resumable") != VERSION:
-            raise _Refused(412, f"the header Tus-Resumable is missing or not {VERSION}", {"Tus-Version": VERSION})
+            raise HTTPException(412, f"the header Tus-Resumable is missing or not {VERSION}", {"Tus-Version": VERSION})
         if method == "POST":
             return await self._create(user, headers, receive)
         if method == "PATCH":
@@ -106,10 +96,10 @@ class UploadRoute:
         upload = await self._run(self.uploads.get, id, user)
         return 200, {"Upload-Offset": str(upload.offset), "Upload-Length": str(upload.size), **self._expires(upload)}
 
-    def _check(self, method: str, headers: Mapping[str, str]) -> str:
+    def _check(self, method: str, request: HTTPConnection) -> str:
         """Returns the user. Raises SignInRequired, Forbidden."""
-        caller = self._access.recognise(_cookie(headers.get("cookie", "")), headers.get("authorization"))
-        return self._access.check(caller, "editor", method, headers.get(CSRF_HEADER.lower())).user
+        caller = self._access.recognise(request.cookies.get(COOKIE), request.headers.get("authorization"))
+        return self._access.check(caller, "editor", method, request.headers.get(CSRF_HEADER)).user
 
     async def _create(self, user: str, headers: Mapping[str, str], receive: Receive) -> tuple[int, dict[str, str]]:
         metadata = parse_metadata(headers.get("upload-metadata", ""))
@@ -125,7 +115,7 @@ class UploadRoute:
 
     async def _append(self, user: str, id: str, headers: Mapping[str, str], receive: Receive) -> tuple[int, dict[str, str]]:
         if headers.get("content-type") != CONTENT_TYPE:
-            raise _Refused(415, f"the content type is not {CONTENT_TYPE}")
+            raise HTTPException(415, f"the content type is not {CONTENT_TYPE}")
         writer = await self._run(self.uploads.write, id, user, _number(headers, "upload-offset"))
         offset = await self._receive(writer, headers, receive)
         return 204, {"Upload-Offset": str(offset), **self._expires(writer.upload)}
@@ -135,7 +125,7 @@ class UploadRoute:
         try:
             check = _checksum(headers)
             if self._writes >= MAX_WRITES:
-                raise _Refused(503, f"the server receives {MAX_WRITES} uploads already; try again", {"Retry-After": "5"})
+                raise HTTPException(503, f"the server receives {MAX_WRITES} uploads already; try again", {"Retry-After": "5"})
         except BaseException:
             await self._run(writer.close)
             raise
@@ -146,7 +136,7 @@ class UploadRoute:
                 await self._run(writer.discard)
                 raise ChecksumMismatch(f"upload {writer.upload.name}: the piece arrived damaged; send it again")
             if not complete:
-                raise _Refused(408, f"no data for {IDLE_S:.0f} s, or the connection broke; resume at byte {writer.offset}")
+                raise HTTPException(408, f"no data for {IDLE_S:.0f} s, or the connection broke; resume at byte {writer.offset}")
             return writer.offset
         finally:
             self._writes -= 1
@@ -222,25 +212,3 @@ def _checksum(headers: Mapping[str, str]) -> tuple[Any, bytes] | None:
     if name not in ALGORITHMS or len(digest) != hashlib.new(name, usedforsecurity=False).digest_size:
         raise BadRequest(f"Upload-Checksum: expected one of {', '.join(ALGORITHMS)}, a space and the digest in base64")
     return hashlib.new(name, usedforsecurity=False), digest
-
-
-def _cookie(header: str) -> str | None:
-    try:
-        found = SimpleCookie(header).get(COOKIE)
-    except CookieError:
-        return None
-    return None if found is None else found.value
-
-
-async def _respond(send: Send, status: int, text: str, more: Mapping[str, str], *, head: bool) -> None:
-    body = f"{text}\n".encode() if text and not head else b""
-    headers = {"Tus-Resumable": VERSION, "Cache-Control": "no-store", "X-Content-Type-Options": "nosniff", **more}
-    if text:
-        headers["Content-Type"] = "text/plain; charset=utf-8"
-    if status == 401:
-        headers["WWW-Authenticate"] = 'Bearer realm="map3d"'
-    if status != 204:
-        headers["Content-Length"] = str(len(body))
-    raw = [(key.lower().encode("latin-1"), value.encode("latin-1")) for key, value in headers.items()]
-    await send({"type": "http.response.start", "status": status, "headers": raw})
-    await send({"type": "http.response.body", "body": body})

@@ -1,4 +1,4 @@
-"""Bodies are read before a thread of Flask takes the request."""
+"""Bodies are read before a thread takes the request."""
 
 import asyncio
 import socket
@@ -7,29 +7,26 @@ from contextlib import ExitStack
 
 import httpx
 import pytest
+from starlette.exceptions import HTTPException
 
-from map3d.web.server import request_body
-from map3d.web.server.request_body import read_body
+from map3d.web.http import bodies
+from map3d.web.http.bodies import read_body
 from tests.web.accounts import add_user, csrf_of
 from tests.web.test_upload_route import Served
 
 
-def read(parts, headers=((b"content-length", b"5"),), pause_s=0.0):
+def read(parts, headers=((b"content-length", b"5"),), pause_s=0.0, most_bytes=1000):
     """Returns the body that `read_body` gives, or the status with which it refuses."""
-    sent, events = [], [{"type": "http.request", "body": part, "more_body": number + 1 < len(parts)} for number, part in enumerate(parts)]
+    events = [{"type": "http.request", "body": part, "more_body": number + 1 < len(parts)} for number, part in enumerate(parts)]
 
     async def receive():
         await asyncio.sleep(pause_s)
         return events.pop(0)
 
-    async def send(event):
-        sent.append(event)
-
-    async def act():
-        body = await read_body({"headers": list(headers)}, receive, send)
-        return sent[0]["status"] if body is None else (await body())["body"]
-
-    return asyncio.run(act())
+    try:
+        return asyncio.run(read_body({"headers": list(headers)}, receive, most_bytes))
+    except HTTPException as error:
+        return error.status_code if error.headers == {"Connection": "close"} else 0
 
 
 def test_pieces_become_one_body():
@@ -41,14 +38,26 @@ def test_request_without_a_body_does_not_wait():
     assert read([], []) == read([], [(b"content-length", b"0")]) == b""
 
 
-def test_size_is_limited(monkeypatch):
-    monkeypatch.setattr(request_body, "MAX_BODY_BYTES", 5)
-    assert read([b"12345"]) == b"12345"
-    assert read([b"123", b"456"]) == 413
+def test_size_is_limited():
+    assert read([b"12345"], most_bytes=5) == b"12345"
+    assert read([b"123", b"456"], most_bytes=5) == 413
+
+
+@pytest.mark.parametrize("length", [b"6", b"9" * 4000])
+def test_body_that_says_it_is_too_large_is_not_read(length):
+    assert read([], [(b"content-length", length)], most_bytes=5) == 413
+
+
+def test_body_without_an_end_is_refused():
+    async def receive():
+        return {"type": "http.disconnect"}
+
+    with pytest.raises(HTTPException, match="connection broke"):
+        asyncio.run(read_body({"headers": [(b"content-length", b"5")]}, receive, 1000))
 
 
 def test_slow_body_is_refused(monkeypatch):
-    monkeypatch.setattr(request_body, "BODY_S", 0.01)
+    monkeypatch.setattr(bodies, "BODY_S", 0.01)
     assert read([b"1", b"2"], pause_s=0.1) == 408
 
 
@@ -61,7 +70,7 @@ def served(workspace, tmp_path):
 
 
 def test_slow_clients_hold_no_thread(served):
-    """Twenty forms that never end, against the eight threads of Flask; meanwhile a user signs in through the real server."""
+    """Twenty forms that never end, against eight threads; meanwhile a user signs in through the real server."""
     fields = f"Host: {served.address.host}\r\nContent-Length: 100\r\nContent-Type: application/x-www-form-urlencoded"
     head = f"POST /sign-in HTTP/1.1\r\n{fields}\r\n\r\nname="
     answers = []

@@ -5,13 +5,14 @@ import time
 from dataclasses import dataclass
 from typing import Final
 
-from map3d.catalogue import Catalogue, RenderingRecord, Workspace
+from map3d.catalogue import RenderingRecord
 from map3d.errors import Map3dError
 from map3d.tile_services.tiled_view import TiledView, find_tiled_view, tiled_views
 from map3d.tiles.manifest import Manifest
 from map3d.tiles.track_stores import read_manifest
 from map3d.types import check_name
 from map3d.web.http.http_errors import status_of
+from map3d.web.http.shared_catalogue import SharedCatalogue
 
 RECHECK_S: Final = 1.0
 """Interval between readings of a manifest."""
@@ -28,11 +29,10 @@ class _Known:
 class TiledViews:
     """Thread-safe."""
 
-    def __init__(self, workspace: Workspace) -> None:
-        self._workspace = workspace
+    def __init__(self, catalogue: SharedCatalogue) -> None:
+        self._catalogue = catalogue
         self._known: dict[str, _Known] = {}
         self._lock = threading.Lock()
-        self._catalogue: Catalogue | None = None
 
     def known_view(self, rendering: str, view_id: str) -> TiledView | None:
         """Returns a view without reading anything; None if it is unknown or was last read more than RECHECK_S ago."""
@@ -51,19 +51,13 @@ class TiledViews:
             known = self._known.get(rendering)
             if known is not None and time.monotonic() - known.checked_s < RECHECK_S:
                 return known.views
-            return self._read(self._open_catalogue().rendering(rendering))
+            return self._read(self._catalogue().rendering(rendering))
 
     def all(self) -> tuple[TiledView, ...]:
         """Returns the views of all renderings, by name; leaves out renderings whose manifest is unreadable."""
         with self._lock:
-            records = sorted(self._open_catalogue().renderings(), key=lambda record: record.name)
+            records = sorted(self._catalogue().renderings(), key=lambda record: record.name)
             return tuple(view for record in records for view in self._read_or_skip(record))
-
-    def close(self) -> None:
-        with self._lock:
-            if self._catalogue is not None:
-                self._catalogue.close()
-                self._catalogue = None
 
     def _read_or_skip(self, record: RenderingRecord) -> tuple[TiledView, ...]:
         try:
@@ -73,7 +67,7 @@ class TiledViews:
             return ()
 
     def _read(self, record: RenderingRecord) -> tuple[TiledView, ...]:
-        data = read_manifest(self._workspace, record)
+        data = read_manifest(self._catalogue.workspace, record)
         known = self._known.pop(record.name, None)
         if data is None:
             return ()
@@ -82,8 +76,3 @@ class TiledViews:
             del self._known[next(iter(self._known))]
         self._known[record.name] = _Known(data, views, time.monotonic())
         return views
-
-    def _open_catalogue(self) -> Catalogue:
-        """Raises NotFound without a workspace."""
-        self._catalogue = self._catalogue or self._workspace.open_catalogue()
-        return self._catalogue

@@ -1,4 +1,3 @@
-import asyncio
 import html
 import json
 import os
@@ -17,6 +16,7 @@ from map3d.registry import NewObject, Registry
 from map3d.tiles import viewer_files
 from map3d.web import create_app
 from map3d.web.http.http_errors import status_of
+from tests.web.conftest import Client
 from tests.web.workspaces import rendering_record
 
 
@@ -32,17 +32,16 @@ def built_viewer(tmp_path, monkeypatch):
 
 
 def test_the_public_routes_are_there(client):
-    rules = list(client.app.flask.url_map.iter_rules())
-    assert {"pages.home", "pages.renderings", "pages.view", "pages.icon", "pages.healthz", "documents.manifest", "static"} <= {
-        rule.endpoint for rule in rules
+    assert {"pages.home", "pages.renderings", "pages.view", "pages.icon", "pages.healthz", "documents.manifest", "pages.static"} <= {
+        rule.name for rule in client.app.views.rules
     }
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE"])
 def test_other_methods_are_405(client, method):
-    for rule in client.app.flask.url_map.iter_rules():
-        path = re.sub("<[^>]*>", "x", rule.rule)
-        if not any(method in other.methods for other in client.app.flask.url_map.iter_rules() if re.sub("<[^>]*>", "x", other.rule) == path):
+    for rule in client.app.views.rules:
+        path = re.sub("{[^}]*}", "x", rule.path)
+        if not any(method == other.method for other in client.app.views.rules if re.sub("{[^}]*}", "x", other.path) == path):
             response = client.request(method, path)
             assert response.status_code == 405, rule
             assert response.headers["cache-control"] == "no-store"
@@ -119,6 +118,36 @@ def test_the_viewers_files_are_compressed_on_request(client, built_viewer):
     for response in (plain, packed):
         again = client.get("/view/tea/map3d.module.js", headers={"if-none-match": response.headers["etag"]})
         assert (again.status_code, again.content) == (304, b"")
+
+
+@pytest.mark.parametrize(("asked", "start", "stop"), [("bytes=0-9", 0, 10), ("bytes=9990-", 9990, None), ("bytes=-7", -7, None)])
+def test_a_range_of_a_file_is_not_compressed(client, built_viewer, asked, start, stop):
+    text = "0123456789" * 1000
+    (built_viewer / "map3d.module.js").write_text(text)
+    part = client.get("/view/tea/map3d.module.js", headers={"range": asked, "accept-encoding": "gzip"})
+    assert (part.status_code, part.text) == (206, text[start:stop])
+    assert "content-encoding" not in part.headers
+    assert part.headers["content-range"].endswith("/10000")
+    assert client.get("/view/tea/map3d.module.js", headers={"range": "bytes=10000-"}).status_code == 416
+    assert client.request("HEAD", "/view/tea/map3d.module.js", headers={"range": asked}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("accept", "html"),
+    [
+        ("text/html,application/xhtml+xml,application/xml;q=0.9,*/*;q=0.8", True),
+        ("text/html", True),
+        ("TEXT/HTML; q=1.0", True),
+        ("*/*", False),
+        ("", False),
+        ("application/json, text/html", False),
+        ("text/html;q=0", False),
+        ("text/html;q=x", False),
+    ],
+)
+def test_browsers_get_errors_as_pages(client, accept, html):
+    response = client.get("/view/none/", headers={"accept": accept})
+    assert (response.status_code, response.headers["content-type"].startswith("text/html")) == (404, html)
 
 
 def test_a_shard_without_objects_is_empty(client):
@@ -248,9 +277,9 @@ def test_a_workspace_without_renderings_says_what_to_do(tmp_path):
     home = Workspace(tmp_path).create().open_catalogue()
     home.create_scene(SceneRecord("town"))
     home.close()
-    app = create_app(tmp_path)
-    assert "map3d create-rendering" in app.flask.test_client().get("/").text
-    asyncio.run(app.close())
+    client = Client(create_app(tmp_path))
+    assert "map3d create-rendering" in client.get("/").text
+    client.close()
 
 
 def test_no_page_has_inline_script_or_style(client, built_viewer):
@@ -268,7 +297,9 @@ def test_the_viewers_page_and_files_are_served(client, built_viewer):
     assert client.get("/view/tea/assets/worker.js").text == "// worker"
 
 
-@pytest.mark.parametrize("file", ["..%2f..%2fsecret", "..%2fsecret", "%2fetc%2fpasswd", "assets", "none.js", "assets%2f..%2f..%2fsecret", "%00"])
+@pytest.mark.parametrize(
+    "file", ["..%2f..%2fsecret", "..%2fsecret", "%2fetc%2fpasswd", "assets", "none.js", "assets%2f..%2f..%2fsecret", "%00", "x" * 5000]
+)
 def test_nothing_outside_the_viewer_is_served(client, built_viewer, file):
     (built_viewer.parent / "secret").write_text("secret")
     assert client.get(f"/view/tea/{file}").status_code == 404
