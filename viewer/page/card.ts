@@ -49,6 +49,22 @@ export function nameOfResult(label: string): string {
   return label.replace(/^\S*(?:\d{3}|_)\S*(?:, |$)/, "") || (/\d/.test(label) ? message("object") : label.replaceAll("_", " "));
 }
 
+/** Lists what the card says of an object's use, age, size and roof, besides its title. */
+function listFacts(attributes: Readonly<Record<string, Attribute>>, title: string): Row[] {
+  const text = (key: string): string => (isWords(attributes[key]) ? attributes[key] : "");
+  const number = (key: string): string => (isNumber(attributes[key]) ? format(attributes[key]) : "");
+  const height = number("measuredHeight");
+  const year = number("yearOfConstruction");
+  const rows: [MessageKey, string][] = [
+    ["use", [text("function"), text("usage")].find((each) => each !== "" && each !== title) ?? ""],
+    ["built", title.endsWith(year) ? "" : year],
+    ["measuredHeight", height && `${height} m`],
+    ["storeys", number("storeysAboveGround")],
+    ["roof", roofInWords(text("roofType"))],
+  ];
+  return rows.filter(([, value]) => value !== "").map(([key, value]) => [message(key), value]);
+}
+
 /** Describes a picked object. @param lonLat of its position, where known */
 export function describe({ id, name, class: type = "", attributes = {}, position = null, approximate = false }: Described & Partial<Pick<ClickEvent, "position" | "approximate">>, units: Units = { crs: "", vertical: null }, lonLat: readonly [number, number] | null = null): Card {
   const text = (key: string): string => (isWords(attributes[key]) ? attributes[key] : "");
@@ -59,16 +75,10 @@ export function describe({ id, name, class: type = "", attributes = {}, position
   const titles = [proper ?? "", address, [text("function") || kind, isNumber(year) ? format(year) : ""].filter(Boolean).join(", ")];
   const isGround = id === 0 || NOT_HIGHLIGHTED.has(type);
   const title = id > 0 && isGround ? kind : id > 0 ? titles.find(Boolean) ?? `${message("object")} ${String(id)}` : message("point");
-  const rows: Row[] = [];
-  const add = (key: MessageKey, value: string): unknown => value !== "" && rows.push([message(key), value]);
-  add("use", [text("function"), text("usage")].find((each) => each !== "" && each !== title) ?? "");
-  add("built", isNumber(year) && !title.endsWith(format(year)) ? format(year) : "");
-  add("measuredHeight", isNumber(attributes["measuredHeight"]) ? `${format(attributes["measuredHeight"])} m` : "");
-  add("storeys", isNumber(attributes["storeysAboveGround"]) ? format(attributes["storeysAboveGround"]) : "");
-  add("roof", roofInWords(text("roofType")));
-  if (position) add("height", `${format(position[2], 2)} m${units.vertical ? ` (${units.vertical})` : ""}`);
+  const rows = listFacts(attributes, title);
+  if (position) rows.push([message("height"), `${format(position[2], 2)} m${units.vertical ? ` (${units.vertical})` : ""}`]);
   const separator = format(0.5).includes(",") ? "; " : ", ";
-  if (lonLat) add("coordinates", lonLat.map((part) => `${format(part, 5)}°`).reverse().join(separator));
+  if (lonLat) rows.push([message("coordinates"), lonLat.map((part) => `${format(part, 5)}°`).reverse().join(separator)]);
   const place: Row[] = position ? [[message("position"), position.slice(0, 2).map((part) => format(part, 2)).join(separator)]] : [];
   if (isGround) rows.push(...place);
   const details: Row[] = [

@@ -1,5 +1,6 @@
 import type { map } from "./map3d.module.js";
 import type { orbit } from "./map3d-orbit.module.js";
+import { prefersReducedMotion } from "../src/core/dom";
 import { GESTURES } from "./dom";
 
 /** A round takes 14 seconds. */
@@ -18,7 +19,7 @@ const SEEN = "map3d-opening";
 export function bindOpening(view: map, turn: orbit): void {
   const pitch = view.directions.find(({ id }) => id === view.direction)?.pitchDeg;
   const directions = view.directions.filter(({ pitchDeg }) => pitchDeg === pitch);
-  if (directions.length < MIN_DIRECTIONS || view.drawer !== "webgl" || view.options.dataSaver || matchMedia("(prefers-reduced-motion: reduce)").matches || wasSeen()) return;
+  if (directions.length < MIN_DIRECTIONS || view.drawer !== "webgl" || view.options.dataSaver || prefersReducedMotion() || wasSeen()) return;
   let [stopped, turned, last] = [false, 0, 0];
   const stop = (): void => {
     stopped = true;

@@ -54,31 +54,17 @@ function open(): void {
     let haze: Haze | undefined;
     if (layer.rendering) bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme, overlay: (paper) => haze?.capture(paper) });
     if (layer.rendering) bindOffline(view, layer.rendering.json.name);
-    colors.open().catch((reason: unknown) => { report(reason); });
-    import("./map3d-controls.module.js").then(({ locate, overview }) => {
-      if (layer.rendering?.json.geographic) new locate().addTo(view);
-      bindOverview(view, new overview({ collapsed: true }).addTo(view));
-    }, (reason: unknown) => { report(reason); });
-    // Depth is as large as colours and normals: it loads after the first picture.
-    if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) view.once("load", () => {
-      import("./map3d-shade.module.js").then(({ shade }) => {
-        new shade().addTo(view);
-        if (view.drawer === "webgl") showShadowSwitch();
-      }, (reason: unknown) => { report(reason); });
-      import("./map3d-orbit.module.js").then(({ orbit }) => {
-        const turn = new orbit().addTo(view);
-        if (isFresh) bindOpening(view, turn);
-      }).catch((reason: unknown) => { report(reason); });
-    });
+    colors.open().catch(report);
+    loadEntries(view, layer, isFresh).catch(report);
     const others = otherEpochs(urls[0] ?? ".");
     bindEpochs(view, layer, others, epoch, (shown, index) => {
       permalink.epoch = index;
       selection.setLayer(shown);
-      colors.setLayer(shown).catch((reason: unknown) => { report(reason); });
+      colors.setLayer(shown).catch(report);
       permalink.write();
     }).then(() => {
       if (id !== undefined) void selection.selectId(id, null, false);
-    }, (reason: unknown) => { report(reason); });
+    }, report);
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
     // Epochs can end elsewhere.
     if (others.length === 0) haze = new Haze(view, layer);
@@ -88,6 +74,24 @@ function open(): void {
   showThumbnail(view, layer);
   layer.addTo(view);
   bindLoading(view);
+}
+
+/** Adds what the page does not need for its first picture. @param opens whether the map begins with a turn around the content */
+async function loadEntries(view: map, layer: imageLayer, opens: boolean): Promise<void> {
+  // Depth is as large as colours and normals: it loads after the first picture.
+  if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) view.once("load", () => {
+    import("./map3d-shade.module.js").then(({ shade }) => {
+      new shade().addTo(view);
+      if (view.drawer === "webgl") showShadowSwitch();
+    }, report);
+    import("./map3d-orbit.module.js").then(({ orbit }) => {
+      const turn = new orbit().addTo(view);
+      if (opens) bindOpening(view, turn);
+    }).catch(report);
+  });
+  const { locate, overview } = await import("./map3d-controls.module.js");
+  if (layer.rendering?.json.geographic) new locate().addTo(view);
+  bindOverview(view, new overview({ collapsed: true }).addTo(view));
 }
 
 /** Reports an error; without a map, or without a way to its tiles, in place of the page. */

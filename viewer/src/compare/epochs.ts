@@ -1,4 +1,4 @@
-import { adoptStyles, element } from "../core/dom";
+import { adoptStyles, element, prefersReducedMotion } from "../core/dom";
 import { UsageError } from "../core/errors";
 import { MapLayer, type imageLayer, type map } from "../map3d";
 import { STYLES } from "./styles";
@@ -104,7 +104,7 @@ export class epochs extends MapLayer<map, EpochsEvents> {
   }
 
   #fadeOut(map: map, old: imageLayer): void {
-    const fade_ms = matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : this.#fade_ms;
+    const fade_ms = prefersReducedMotion() ? 0 : this.#fade_ms;
     let frame = 0;
     const end = (): void => {
       map.off("idle", start);

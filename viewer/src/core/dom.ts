@@ -37,3 +37,6 @@ export function adoptStyles(document: Document, css: string): void {
   sheet.replaceSync(css);
   document.adoptedStyleSheets = [sheet, ...document.adoptedStyleSheets];
 }
+
+/** Whether the user prefers reduced motion. */
+export const prefersReducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;

@@ -1,19 +1,19 @@
 import { checkNumber, checkVector } from "../core/check";
+import { prefersReducedMotion } from "../core/dom";
 import { asError, FetchError, UsageError } from "../core/errors";
 import { Evented } from "../core/events";
 import { checkPosition, isVector, type AnyPosition, type Position } from "../core/position";
-import { add, clamp, dot, boxCenter, sub, type Vec2, type Vec3 } from "../core/vec";
+import { clamp, dot, boxCenter, sub, type Vec2, type Vec3 } from "../core/vec";
 import { cssPixelM, screenFromLocal, uvFromScreen, zoomedAt, type Camera } from "../geo/camera";
-import { localFromLonLat, lonLatFromLocal } from "../geo/geographic";
 import type { Rendering, View } from "../geo/manifest";
-import { worldPosition } from "../geo/position";
+import { lonLatFromWorld, worldFromLonLat, worldPosition } from "../geo/position";
 import { findIncompatibility } from "./compatibility";
 import { findNeighbourView, findTiltedView } from "./neighbourViews";
-import { centerCamera, checkBounds, findGround, fitCamera, localBox, panCamera, type Bounds } from "./cameras";
+import { centerCamera, checkBounds, findGround, fitCamera, localBox, makeFirstCamera, panCamera, type Bounds } from "./cameras";
 import { COARSE_STEPS, type LayerPlan } from "./layerPlan";
-import { limitCamera, computeZoomLimits, fillScreen, panSoftly, type Limits } from "./limits";
+import { limitCamera, computeZoomLimits, panSoftly, type Limits } from "./limits";
 import { Motion } from "./motion";
-import { EVENTS, type FilledOptions, type MapEvents } from "./options";
+import { EVENTS, type FilledOptions, type FitOptions, type MapEvents } from "./options";
 import type { ViewState } from "./layerContext";
 import type { ViewTransition } from "./viewTransition";
 import type { Size } from "./viewport";
@@ -22,16 +22,6 @@ const FLIGHT_MS = 700;
 const STEP_MS = 220;
 /** A rotation by two fingers that switches to the next direction. */
 const ROTATION_STEP_RAD = (28 * Math.PI) / 180;
-
-/** Options of `fitBounds`. */
-export interface FitOptions {
-  /** Padding on each side. Default 24. */
-  padding_px?: number;
-  /** Duration of the animation. Default 0: none. */
-  duration_ms?: number;
-  /** Upper limit of the zoom. Default: the map's. */
-  maxZoom?: number;
-}
 
 /** The map's camera and everything that moves it. Calls before the first manifest has loaded wait for it. */
 export abstract class CameraController extends Evented<MapEvents> {
@@ -229,17 +219,13 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Converts a world position to longitude and latitude (WGS 84, degrees); null before "ready", and where the scene's position on earth is unknown. */
   lonLat(world: Vec3): Vec2 | null {
-    const json = this.reference?.json;
-    return json?.geographic ? lonLatFromLocal(json.geographic, sub(world, json.origin)) : null;
+    return this.reference ? lonLatFromWorld(this.reference.json, world) : null;
   }
 
   /** Converts longitude and latitude to world x and y; null as with lonLat. */
   fromLonLat(lonLat: Vec2): Vec2 | null {
     checkVector(lonLat, "fromLonLat", "[longitude, latitude] in degrees", 2);
-    const json = this.reference?.json;
-    if (!json?.geographic) return null;
-    const [x, y] = localFromLonLat(json.geographic, lonLat);
-    return [json.origin[0] + x, json.origin[1] + y];
+    return this.reference ? worldFromLonLat(this.reference.json, lonLat) : null;
   }
 
   /** @internal */
@@ -369,24 +355,13 @@ export abstract class CameraController extends Evented<MapEvents> {
     if (direction !== undefined && !views.has(direction)) this.report(new UsageError(`unknown view "${direction}"; the rendering has ${[...views.keys()].join(", ")}`));
     this.reference = rendering;
     this.#limits = { box: json.box, bounds: json.box, minZoom, maxZoom };
-    this.setCamera(this.#makeFirstCamera(rendering, view));
+    this.setCamera(makeFirstCamera(rendering, view, this.size, this.options));
     this.#unsized = this.size.width * this.size.height > 0 ? undefined : this.camera;
     if (maxBounds) this.#pending.unshift(() => { this.setMaxBounds(maxBounds); });
     if (center && !isVector(center)) this.#pending.unshift(() => { this.setView(center, zoom); });
     for (const action of this.#pending.splice(0)) this.#runPending(action);
     this.fire("ready", {});
     this.fire("directionchange", { direction: this.direction });
-  }
-
-  /** Makes the camera of the first picture. */
-  #makeFirstCamera(rendering: Rendering, { frame }: Pick<View, "frame">): Camera {
-    const { width, height } = this.size;
-    const { json } = rendering;
-    const { center, zoom, cover } = this.options;
-    const whole = fitCamera({ frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
-    const fitted = cover ? fillScreen(whole, rendering.views.get(frame.id) as View, json.box) : whole;
-    const start = center && isVector(center) ? center : json.start && add(json.origin, json.start.local);
-    return start ? centerCamera(fitted, rendering, start, zoom) : { ...fitted, zoom: zoom ?? fitted.zoom };
   }
 
   /** Gives the camera the map's size. The first size sets what nothing else has set before: the zoom, and the position. */
@@ -397,7 +372,7 @@ export abstract class CameraController extends Evented<MapEvents> {
     let { u, v, zoom } = camera;
     if (before && width * height > 0) {
       this.#unsized = undefined;
-      const first = this.#makeFirstCamera(reference as Rendering, camera);
+      const first = makeFirstCamera(reference as Rendering, camera, { width, height }, this.options);
       if (u === before.u && v === before.v) ({ u, v } = first);
       if (zoom === before.zoom) ({ zoom } = first);
     }
@@ -487,6 +462,3 @@ export abstract class CameraController extends Evented<MapEvents> {
     this.fire("directionchange", { direction: nextView.id });
   }
 }
-
-/** Whether the user prefers reduced motion. */
-const prefersReducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;

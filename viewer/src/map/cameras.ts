@@ -1,9 +1,12 @@
-import { checkPosition, type Position } from "../core/position";
+import { checkPosition, isVector, type Position } from "../core/position";
 import { add, boxCenter, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { cssPixelM, projectedBox, uvFromScreen, zoomToFit, type Camera } from "../geo/camera";
-import type { Rendering } from "../geo/manifest";
+import type { Rendering, View } from "../geo/manifest";
 import { worldPosition } from "../geo/position";
+import { fillScreen } from "./limits";
+import type { MapOptions } from "./options";
+import type { Size } from "./viewport";
 
 /** A box by two opposite corners. */
 export type Bounds = readonly [Position, Position];
@@ -37,6 +40,15 @@ export function fitCamera(camera: Camera, box: Box3, padding: number, maxZoom: n
   const [low, high] = projectedBox(camera.frame, box);
   const [u, v] = uvdFromLocal(camera.frame.axes, boxCenter(box));
   return { ...camera, u, v, zoom: Math.min(zoomToFit(camera, high[0] - low[0], high[1] - low[1], padding), maxZoom) };
+}
+
+/** Makes the camera of the first picture: about the option `center`, else the rendering's start, else of everything. */
+export function makeFirstCamera(rendering: Rendering, { frame }: Pick<View, "frame">, { width, height }: Pick<Size, "width" | "height">, { center, zoom, cover }: MapOptions): Camera {
+  const { json } = rendering;
+  const whole = fitCamera({ frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
+  const fitted = cover ? fillScreen(whole, rendering.views.get(frame.id) as View, json.box) : whole;
+  const start = center && isVector(center) ? center : json.start && add(json.origin, json.start.local);
+  return start ? centerCamera(fitted, rendering, start, zoom) : { ...fitted, zoom: zoom ?? fitted.zoom };
 }
 
 /** Returns the world position under CSS pixels at the height of the lowest content; null in level views. */

@@ -1,9 +1,7 @@
 import { checkNumber, checkOptions } from "../core/check";
-import type { AddToCorner, Corner } from "../core/corner";
 import { adoptStyles, element } from "../core/dom";
 import { asError } from "../core/errors";
 import { Evented } from "../core/events";
-import { getFeature } from "../core/features";
 import type { Addable, LayerHost } from "../core/mapLayer";
 import { checkPosition, type AnyPosition } from "../core/position";
 import type { OverlayHost, OverlayEvents } from "../core/overlayHost";
@@ -15,25 +13,23 @@ import type { Light } from "../geo/light";
 import type { LightEstimator } from "../draw/lightEstimator";
 import type { Rendering } from "../geo/manifest";
 import type { marker } from "../overlay/marker";
-import { createAttribution } from "../ui/attribution";
-import { createControls } from "../ui/controls";
-import { createScaleBar } from "../ui/scaleBar";
 import { STYLES } from "../ui/styles";
 import { FrameLoop } from "./frameLoop";
 import { Gestures, type GestureTarget } from "./gestures";
 import type { imageLayer } from "./imageLayer";
-import { findVisibleObjects, type VisibleObject } from "./visibleObjects";
+import { findAllVisibleObjects, type VisibleObject } from "./visibleObjects";
 import { listenToKeys } from "./keyboard";
 import type { LayerPlan } from "./layerPlan";
 import { MapItems } from "./mapItems";
 import { MapLight, checkTime } from "./mapLight";
 import { DEFAULTS, OPTIONS, savesData, type FilledOptions, type MapOptions } from "./options";
 import { FrameRenderer, type PlanInput } from "./frameRenderer";
-import { EMPTY_PICK, pickExactly, pickLoaded, type Pick } from "./picker";
+import { EMPTY_PICK, pick, pickLoaded, type Pick } from "./picker";
 import { PointerEvents } from "./pointerEvents";
 import { Relief } from "./relief";
 import { findPosition } from "./findPosition";
 import type { ViewState, LayerContext } from "./layerContext";
+import { addControls } from "./addControls";
 import { CameraController } from "./cameraController";
 import { checkBounds } from "./cameras";
 import { Viewport, type Size } from "./viewport";
@@ -85,7 +81,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     if (options.background !== undefined) this.setBackground(options.background);
     this.#renderer = this.#createRenderer();
     this.#addListeners();
-    this.#addControls();
+    addControls(this, this.options);
   }
 
   // Layers, markers and popups
@@ -231,21 +227,13 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** Picks the object under CSS pixels, exactly: fetches a tile of the deepest level. Approximate if that fails. */
   async pick(point: Vec2): Promise<Pick> {
     const viewState = this.getViewState();
-    if (!viewState) return EMPTY_PICK;
-    try {
-      return await pickExactly(this.layers, viewState, point);
-    } catch {
-      // The tile's error was reported when it failed.
-      return { ...(pickLoaded(this.layers, viewState, point) ?? EMPTY_PICK), approximate: true };
-    }
+    return viewState ? pick(this.layers, viewState, point) : EMPTY_PICK;
   }
 
   /** Lists the visible objects of all layers, topmost layer first and the largest of each layer first. Ignores occlusion between layers. @param hidden includes objects that styles hide */
   async objectsInView(hidden = false): Promise<readonly (VisibleObject & { readonly layer: imageLayer })[]> {
     const viewState = this.getViewState();
-    if (!viewState) return [];
-    const found = await Promise.all([...this.layers].reverse().map(async (layer) => (await findVisibleObjects(layer, viewState, hidden)).map((seen) => ({ ...seen, layer }))));
-    return found.flat();
+    return viewState ? findAllVisibleObjects(this.layers, viewState, hidden) : [];
   }
 
   /** Picks from the tiles in memory; null when none covers the point. */
@@ -466,17 +454,6 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
       queueMicrotask(() => { this.report(error); });
       return null;
     }
-  }
-
-  #addControls(): void {
-    const { controls, attribution, scaleBar = controls !== false } = this.options;
-    const add = (control: HTMLElement, corner: Corner | true): void => {
-      if (corner === true) this.controlPane.append(control);
-      else (getFeature("controls", `"${corner}"`) as AddToCorner)(this.controlPane, control, corner);
-    };
-    if (controls) add(createControls(this), controls);
-    if (scaleBar) add(createScaleBar(this), scaleBar);
-    if (attribution) add(createAttribution(this), attribution);
   }
 
   #addListeners(): void {

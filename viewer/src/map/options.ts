@@ -82,6 +82,16 @@ export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
 
 export const OPTIONS: readonly string[] = [...Object.keys(DEFAULTS), "center", "zoom", "minZoom", "maxZoom", "maxBounds", "scaleBar", "direction", "light", "background", "language", "pixelRatio", "cacheBytes"];
 
+/** Options of `fitBounds`. */
+export interface FitOptions {
+  /** Padding on each side. Default 24. */
+  padding_px?: number;
+  /** Duration of the animation. Default 0: none. */
+  duration_ms?: number;
+  /** Upper limit of the zoom. Default: the map's. */
+  maxZoom?: number;
+}
+
 /** Types of a map's events. */
 export const EVENTS: readonly (keyof MapEvents)[] = ["ready", "load", "idle", "move", "moveend", "zoom", "directionchange", "lightchange", "preclick", "click", "mousemove", "select", "resize", "error", "contextlost", "contextrestored", "remove"];
 

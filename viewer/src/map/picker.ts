@@ -23,8 +23,18 @@ export interface Pick {
 
 export const EMPTY_PICK: Pick = { id: 0, position: null, approximate: false, layer: null };
 
+/** Picks the object under CSS pixels, exactly; approximate where a tile cannot be fetched. */
+export async function pick(layers: readonly imageLayer[], viewState: ViewState, at: Vec2): Promise<Pick> {
+  try {
+    return await pickExactly(layers, viewState, at);
+  } catch {
+    // The tile's error was reported when it failed.
+    return { ...(pickLoaded(layers, viewState, at) ?? EMPTY_PICK), approximate: true };
+  }
+}
+
 /** Picks exactly, from the deepest level; fetches its tiles if necessary. */
-export async function pickExactly(layers: readonly imageLayer[], viewState: ViewState, at: Vec2): Promise<Pick> {
+async function pickExactly(layers: readonly imageLayer[], viewState: ViewState, at: Vec2): Promise<Pick> {
   for (const group of groupsAt(layers, viewState, at)) {
     const picks = await Promise.all(group.map((layer) => pickFromLayer(layer, viewState, at)));
     const pick = findNearest(picks, group, viewState);

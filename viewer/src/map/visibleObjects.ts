@@ -11,8 +11,14 @@ export interface VisibleObject {
   readonly share: number;
 }
 
-/** Finds the visible objects of a layer, the largest first. Fetches the id tiles of the shown level. @param hidden includes objects that its style hides  @throws the error of a fetch */
-export async function findVisibleObjects(layer: imageLayer, viewState: ViewState, hidden: boolean): Promise<VisibleObject[]> {
+/** Finds the visible objects of layers: those of the last layer first, the largest of each layer first. @param hidden includes objects that styles hide  @throws the error of a fetch */
+export async function findAllVisibleObjects(layers: readonly imageLayer[], viewState: ViewState, hidden: boolean): Promise<(VisibleObject & { readonly layer: imageLayer })[]> {
+  const found = await Promise.all([...layers].reverse().map(async (layer) => (await findVisibleObjects(layer, viewState, hidden)).map((seen) => ({ ...seen, layer }))));
+  return found.flat();
+}
+
+/** Finds the visible objects of a layer, the largest first. Fetches the id tiles of the shown level. */
+async function findVisibleObjects(layer: imageLayer, viewState: ViewState, hidden: boolean): Promise<VisibleObject[]> {
   const { camera, dpr, finer } = viewState;
   const [view, info] = [layer.findView(camera.frame), layer.rendering?.layers.get("id")];
   const { rendering, tiles } = layer;

@@ -1,3 +1,4 @@
+import { prefersReducedMotion } from "../core/dom";
 import { add, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { MapLayer, FetchError, UsageError, type map } from "../map3d";
 import { readModelContents, disposeGpuResources, isSkinned, type ModelContents } from "./modelContents";
@@ -55,8 +56,6 @@ export type ModelSource<T extends Three> = string | InstanceType<T["Object3D"]> 
 const MIN_REVISION = 155;
 const RAD = Math.PI / 180;
 
-const reducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
-
 /** A 3D model between the images: buildings hide it, it hides buildings, and the map's light lights it. The page passes in its own three.js, which draws it. */
 export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLayerEvents<T>> {
   readonly needs = ["depth"] as const;
@@ -88,7 +87,7 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
     this.#heading_deg = checkNumber(options.heading_deg ?? 0, "heading_deg");
     this.#scale = checkScale(options.scale ?? 1);
     const { play = true } = options;
-    if (play !== false && !reducedMotion()) this.#pending = { names: play === true ? [] : [play].flat(), loop: true };
+    if (play !== false && !prefersReducedMotion()) this.#pending = { names: play === true ? [] : [play].flat(), loop: true };
     this.#pivot = new three.Group();
     this.#sceneModel = this.#createSceneModel();
   }

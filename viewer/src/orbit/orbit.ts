@@ -1,3 +1,4 @@
+import { prefersReducedMotion } from "../core/dom";
 import { clamp, type Vec2, type Vec3 } from "../core/vec";
 import { computeAxes, uvdFromLocal } from "../geo/axes";
 import type { Camera } from "../geo/camera";
@@ -50,7 +51,6 @@ const MAX_WAIT_MS = 2500;
 /** A gesture must exceed this angle to change the view. */
 const MIN_GESTURE_DEG = 3;
 
-const reducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
 const anglesOf = ({ lookAtDeg, pitchDeg }: Frame): ViewAngles => ({ lookAt: lookAtDeg, pitch: pitchDeg });
 /** Signed difference of two angles, −180 to 180. */
 const angleBetween = (from: number, to: number): number => ((((to - from + 180) % 360) + 360) % 360) - 180;
@@ -89,7 +89,7 @@ export class orbit extends MapLayer<map, object> implements ViewTransition {
   /** @internal */
   start(from: Camera, pivot: Vec3): void {
     const { map } = this;
-    if (reducedMotion() || !map?.drawer) return;
+    if (prefersReducedMotion() || !map?.drawer) return;
     if (map.drawer === "canvas") {
       if (map.drawerElement) fadeOut(map.drawerElement, FADE_MS, () => map.showsPreviousView);
       return;
@@ -102,7 +102,7 @@ export class orbit extends MapLayer<map, object> implements ViewTransition {
   /** @internal */
   rotateBy(rad: number): boolean {
     const map = this.map;
-    if (!map || map.drawer !== "webgl" || reducedMotion()) return false;
+    if (!map || map.drawer !== "webgl" || prefersReducedMotion()) return false;
     this.#gesture ??= { base_deg: this.#transition?.current.lookAt ?? map.lookAt_deg, turned_deg: 0 };
     this.#gesture.turned_deg += (rad * 180) / Math.PI;
     const lookAt = this.#gesture.base_deg + this.#gesture.turned_deg;
