@@ -3,7 +3,17 @@ import tseslint from "typescript-eslint";
 import { ENTRIES } from "./scripts/entries.mjs";
 
 /** Folders of src from the lowest rank up: a folder may import those of lower ranks, and itself. */
-const RANKS = { core: 0, geo: 1, tiles: 2, draw: 3, overlay: 4, ui: 4, map: 5, map3d: 6, ...Object.fromEntries(Object.keys(ENTRIES).map((name) => [name, 7])) };
+const RANKS = {
+  core: 0,
+  geo: 1,
+  tiles: 2,
+  draw: 3,
+  overlay: 4,
+  ui: 4,
+  map: 5,
+  map3d: 6,
+  ...Object.fromEntries(Object.keys(ENTRIES).map((name) => [name, 7])),
+};
 /** Entries import the public names, and the two lowest folders. */
 const SEEN_BY_ENTRIES = ["core", "geo", "map3d"];
 const SRC = resolve(import.meta.dirname, "src");
@@ -12,14 +22,21 @@ const folderOf = (file) => relative(SRC, file).split(/[\\/]/)[0];
 
 /** Imports go down only; siblings of one rank do not import each other. */
 const importDirection = {
-  meta: { type: "problem", messages: { up: "{{from}} may not import {{to}}: entries > map3d > map > {ui, overlay} > draw > tiles > geo > core; an entry imports map3d, geo and core only" }, schema: [] },
+  meta: {
+    type: "problem",
+    messages: {
+      up: "{{from}} may not import {{to}}: entries > map3d > map > {ui, overlay} > draw > tiles > geo > core; an entry imports map3d, geo and core only",
+    },
+    schema: [],
+  },
   create(context) {
     const from = folderOf(context.filename);
     const check = (node) => {
       const path = node.source?.value?.replace(/^worker:/, "");
       if (!path?.startsWith(".") || !(from in RANKS)) return;
       const to = folderOf(resolve(dirname(context.filename), path));
-      if (to !== from && (!(RANKS[to] < RANKS[from]) || !(!(from in ENTRIES) || SEEN_BY_ENTRIES.includes(to)))) context.report({ node, messageId: "up", data: { from, to } });
+      if (to !== from && (!(RANKS[to] < RANKS[from]) || !(!(from in ENTRIES) || SEEN_BY_ENTRIES.includes(to))))
+        context.report({ node, messageId: "up", data: { from, to } });
     };
     return { ImportDeclaration: check, ExportNamedDeclaration: check, ExportAllDeclaration: check, ImportExpression: check };
   },

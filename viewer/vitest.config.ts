@@ -7,4 +7,7 @@ const workers = {
   load: (id: string) => (id === "\0worker" ? 'export default ""' : null),
 };
 
-export default defineConfig({ plugins: [workers], test: { include: ["test/unit/**/*.test.ts"], environment: "node", testTimeout: 120_000 } });
+export default defineConfig({
+  plugins: [workers],
+  test: { include: ["test/unit/**/*.test.ts"], environment: "node", testTimeout: 120_000 },
+});

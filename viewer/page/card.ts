@@ -24,7 +24,22 @@ export interface Units {
 
 /** Years and numbers of houses have no separators of thousands. */
 const PLAIN = { useGrouping: false, maximumFractionDigits: 12 } as const;
-const CLASSES: Readonly<Record<string, MessageKey>> = { building: "building", building_part: "buildingPart", terrain: "terrain", ground: "terrain", tinrelief: "terrain", solitary_vegetation_object: "tree", plant_cover: "vegetation", vegetation: "vegetation", water_body: "water", road: "road", bridge: "bridge", tunnel: "tunnel", city_furniture: "furniture", land_use: "landUse" };
+const CLASSES: Readonly<Record<string, MessageKey>> = {
+  building: "building",
+  building_part: "buildingPart",
+  terrain: "terrain",
+  ground: "terrain",
+  tinrelief: "terrain",
+  solitary_vegetation_object: "tree",
+  plant_cover: "vegetation",
+  vegetation: "vegetation",
+  water_body: "water",
+  road: "road",
+  bridge: "bridge",
+  tunnel: "tunnel",
+  city_furniture: "furniture",
+  land_use: "landUse",
+};
 
 /** Classes of the ground, which is not marked and not listed. */
 export const NOT_HIGHLIGHTED: ReadonlySet<string> = new Set(["terrain", "ground", "tinrelief"]);
@@ -35,7 +50,8 @@ export function kindOf(type: string): string {
   return known ? message(known) : isWords(type) ? type.replaceAll("_", " ") : "";
 }
 
-const format = (value: number, digits?: number): string => value.toLocaleString(language, digits === undefined ? PLAIN : { ...PLAIN, minimumFractionDigits: digits, maximumFractionDigits: digits });
+const format = (value: number, digits?: number): string =>
+  value.toLocaleString(language, digits === undefined ? PLAIN : { ...PLAIN, minimumFractionDigits: digits, maximumFractionDigits: digits });
 const isNumber = (value: Attribute | undefined): value is number => typeof value === "number" && Number.isFinite(value) && value > -999;
 /** Text that is not a code. */
 const isWords = (value: Attribute | undefined): value is string => typeof value === "string" && /\p{L}{3}/u.test(value);
@@ -66,7 +82,18 @@ function listFacts(attributes: Readonly<Record<string, Attribute>>, title: strin
 }
 
 /** Describes a picked object. @param lonLat of its position, where known */
-export function describe({ id, name, class: type = "", attributes = {}, position = null, approximate = false }: Described & Partial<Pick<ClickEvent, "position" | "approximate">>, units: Units = { crs: "", vertical: null }, lonLat: readonly [number, number] | null = null): Card {
+export function describe(
+  {
+    id,
+    name,
+    class: type = "",
+    attributes = {},
+    position = null,
+    approximate = false,
+  }: Described & Partial<Pick<ClickEvent, "position" | "approximate">>,
+  units: Units = { crs: "", vertical: null },
+  lonLat: readonly [number, number] | null = null,
+): Card {
   const text = (key: string): string => (isWords(attributes[key]) ? attributes[key] : "");
   const year = attributes["yearOfConstruction"];
   const kind = kindOf(type);
@@ -74,20 +101,46 @@ export function describe({ id, name, class: type = "", attributes = {}, position
   const address = text("address");
   const titles = [proper ?? "", address, [text("function") || kind, isNumber(year) ? format(year) : ""].filter(Boolean).join(", ")];
   const isGround = id === 0 || NOT_HIGHLIGHTED.has(type);
-  const title = id > 0 && isGround ? kind : id > 0 ? titles.find(Boolean) ?? `${message("object")} ${String(id)}` : message("point");
+  const title = id > 0 && isGround ? kind : id > 0 ? (titles.find(Boolean) ?? `${message("object")} ${String(id)}`) : message("point");
   const rows = listFacts(attributes, title);
   if (position) rows.push([message("height"), `${format(position[2], 2)} m${units.vertical ? ` (${units.vertical})` : ""}`]);
   const separator = format(0.5).includes(",") ? "; " : ", ";
-  if (lonLat) rows.push([message("coordinates"), lonLat.map((part) => `${format(part, 5)}°`).reverse().join(separator)]);
-  const place: Row[] = position ? [[message("position"), position.slice(0, 2).map((part) => format(part, 2)).join(separator)]] : [];
+  if (lonLat)
+    rows.push([
+      message("coordinates"),
+      lonLat
+        .map((part) => `${format(part, 5)}°`)
+        .reverse()
+        .join(separator),
+    ]);
+  const place: Row[] = position
+    ? [
+        [
+          message("position"),
+          position
+            .slice(0, 2)
+            .map((part) => format(part, 2))
+            .join(separator),
+        ],
+      ]
+    : [];
   if (isGround) rows.push(...place);
   const details: Row[] = [
     ...(isGround ? [] : place),
     ...(id > 0 ? [["id", String(id)] as const] : []),
     ...(name !== undefined && name !== title ? [["gml:id", name] as const] : []),
-    ...Object.entries(attributes).map(([key, value]) => [key, formatValue(value)] as const).filter(([, value]) => value !== ""),
+    ...Object.entries(attributes)
+      .map(([key, value]) => [key, formatValue(value)] as const)
+      .filter(([, value]) => value !== ""),
   ];
-  return { title, note: [title === kind ? "" : kind, title === address ? "" : address, approximate ? message("approximate") : ""].filter(Boolean).join(" · "), rows, details };
+  return {
+    title,
+    note: [title === kind ? "" : kind, title === address ? "" : address, approximate ? message("approximate") : ""]
+      .filter(Boolean)
+      .join(" · "),
+    rows,
+    details,
+  };
 }
 
 function formatValue(value: Attribute): string {

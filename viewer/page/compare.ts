@@ -32,9 +32,15 @@ export class Compare {
     this.#pitch_deg = pitches.find((pitch) => pitches.filter((other) => other === pitch).length >= TURNS_DEG.length);
     byId("compare").hidden = this.#pitch_deg === undefined;
     byId("compare").addEventListener("click", () => void this.#open().catch(report));
-    byId("end-compare").addEventListener("click", () => { this.#close(); });
-    addEventListener("keydown", ({ key }) => { if (key === "Escape" && !document.querySelector("dialog[open]")) this.#close(); });
-    context.view.on("lightchange", () => { this.#light(); });
+    byId("end-compare").addEventListener("click", () => {
+      this.#close();
+    });
+    addEventListener("keydown", ({ key }) => {
+      if (key === "Escape" && !document.querySelector("dialog[open]")) this.#close();
+    });
+    context.view.on("lightchange", () => {
+      this.#light();
+    });
   }
 
   /** Highlights in all maps what is highlighted in the page's. */
@@ -48,7 +54,8 @@ export class Compare {
     if (this.#end) return;
     document.body.classList.add("compares");
     const shown = view.directions.find(({ id }) => id === view.direction);
-    if (shown?.pitchDeg !== this.#pitch_deg) view.setDirection(view.directions.find(({ pitchDeg }) => pitchDeg === this.#pitch_deg)?.id ?? view.direction);
+    if (shown?.pitchDeg !== this.#pitch_deg)
+      view.setDirection(view.directions.find(({ pitchDeg }) => pitchDeg === this.#pitch_deg)?.id ?? view.direction);
     for (let k = 1; k < TURNS_DEG.length; k++) this.#others.push(this.#addMap());
     this.#light();
     this.highlight();
@@ -84,8 +91,24 @@ export class Compare {
     box.className = "compared";
     view.container.parentElement?.append(box);
     const { center, zoom, direction, light, drawer, options } = view;
-    const other = new map(box, { ...(center && { center }), zoom, direction, light, ...(drawer && { drawer }), dataSaver: options.dataSaver, controls: false, scaleBar: false, attribution: false });
-    other.on("error", ({ error }) => { report(error); }).on("click", (event) => { onClick(event); });
+    const other = new map(box, {
+      ...(center && { center }),
+      zoom,
+      direction,
+      light,
+      ...(drawer && { drawer }),
+      dataSaver: options.dataSaver,
+      controls: false,
+      scaleBar: false,
+      attribution: false,
+    });
+    other
+      .on("error", ({ error }) => {
+        report(error);
+      })
+      .on("click", (event) => {
+        onClick(event);
+      });
     for (const layer of view.layers) {
       const copy = layer.copy();
       this.#copies.push([layer, copy.addTo(other)]);
@@ -93,7 +116,10 @@ export class Compare {
     const [first] = other.layers;
     other.whenReady(() => {
       if (hasHaze && first) new Haze(other, first);
-      if (first?.rendering?.layers.has("depth") && !options.dataSaver) import("./map3d-shade.module.js").then(({ shade }) => { new shade().addTo(other); }, report);
+      if (first?.rendering?.layers.has("depth") && !options.dataSaver)
+        import("./map3d-shade.module.js").then(({ shade }) => {
+          new shade().addTo(other);
+        }, report);
     });
     return other;
   }

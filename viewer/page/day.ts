@@ -18,6 +18,7 @@ export function findDay(altitudeAt: (hour: number) => number): Day {
   const altitudes = hours.map(altitudeAt);
   const isUp = (k: number, limit: number): boolean => (altitudes[k] ?? NaN) >= limit;
   const bright = hours.filter((_, k) => isUp(k, TWILIGHT_DEG));
-  const crossing = (rises: boolean): number | null => hours.find((_, k) => k > 0 && isUp(k, HORIZON_DEG) === rises && isUp(k - 1, HORIZON_DEG) !== rises) ?? null;
+  const crossing = (rises: boolean): number | null =>
+    hours.find((_, k) => k > 0 && isUp(k, HORIZON_DEG) === rises && isUp(k - 1, HORIZON_DEG) !== rises) ?? null;
   return { dawn: bright[0] ?? 0, dusk: bright.at(-1) ?? 24, sunrise: crossing(true), sunset: crossing(false) };
 }

@@ -8,24 +8,39 @@ export function otherEpochs(base: string): string[] {
 }
 
 /** Adds a slider over all epochs. Skips renderings that cannot be loaded; the map reports why. @param initial index of the epoch to show first  @param onChange called with the newly shown layer */
-export async function bindEpochs(view: map, first: imageLayer, others: readonly string[], initial: number, onChange: (layer: imageLayer, index: number) => void): Promise<void> {
+export async function bindEpochs(
+  view: map,
+  first: imageLayer,
+  others: readonly string[],
+  initial: number,
+  onChange: (layer: imageLayer, index: number) => void,
+): Promise<void> {
   const results = await Promise.allSettled(others.map((url) => addLayer(view, url)));
   const layers = [first, ...results.flatMap((result) => (result.status === "fulfilled" ? [result.value] : []))];
   if (layers.length < 2) return;
   const { epochs } = await import("./map3d-compare.module.js");
   const shown = initial < layers.length ? initial : 0;
   byId("epochs").hidden = false;
-  new epochs(layers.map((layer) => ({ layer, label: labelOf(layer, layers) })), { shown, container: byId("epochs") })
-    .on("change", ({ epoch, index }) => { onChange(epoch.layer, index); })
+  new epochs(
+    layers.map((layer) => ({ layer, label: labelOf(layer, layers) })),
+    { shown, container: byId("epochs") },
+  )
+    .on("change", ({ epoch, index }) => {
+      onChange(epoch.layer, index);
+    })
     .addTo(view);
-  byId("modes").addEventListener("change", () => { for (const layer of layers) layer.setMode(first.mode); });
+  byId("modes").addEventListener("change", () => {
+    for (const layer of layers) layer.setMode(first.mode);
+  });
   if (shown > 0) onChange(layers[shown] ?? first, shown);
 }
 
 function addLayer(view: map, url: string): Promise<imageLayer> {
   return new Promise((resolve, reject) => {
     const layer = new imageLayer(url, { opacity: 0 });
-    layer.once("ready", () => { resolve(layer); });
+    layer.once("ready", () => {
+      resolve(layer);
+    });
     layer.once("error", ({ error }) => {
       view.discard(layer);
       reject(error);

@@ -22,10 +22,18 @@ export class Haze {
     [this.#view, this.#layer] = [view, layer];
     [this.#canvas.width, this.#canvas.height, this.#canvas.className] = [SIDE_PX, SIDE_PX, "haze"];
     view.canvas.after(this.#canvas);
-    view.frameEvents.on("move", () => { this.#place(); });
-    view.on("idle", () => { void this.#update(); });
-    view.on("lightchange", () => { this.#color(); });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { this.#color(); });
+    view.frameEvents.on("move", () => {
+      this.#place();
+    });
+    view.on("idle", () => {
+      void this.#update();
+    });
+    view.on("lightchange", () => {
+      this.#color();
+    });
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      this.#color();
+    });
     this.#color();
   }
 
@@ -54,7 +62,9 @@ export class Haze {
     const [x, y, size] = square;
     const canvas = this.#canvas.cloneNode() as HTMLCanvasElement;
     fill(canvas, mask, paper ?? this.#rgb);
-    return (context) => { context.drawImage(canvas, x, y, size, size); };
+    return (context) => {
+      context.drawImage(canvas, x, y, size, size);
+    };
   }
 
   /** Shows the haze of the current view once its mask is known. Without one, as offline, there is no haze. */
@@ -79,19 +89,34 @@ export class Haze {
     if (!color || color.format === "jpeg") return null;
     const data = await this.#layer.source.tile(view, color, { z: 0, x: 0, y: 0 });
     if (data === null) return null;
-    const bitmap = data instanceof ArrayBuffer ? await createImageBitmap(new Blob([data], { type: color.media_type })) : "bitmap" in data ? data.bitmap : null;
-    const context = Object.assign(document.createElement("canvas"), { width: SIDE_PX, height: SIDE_PX }).getContext("2d", { willReadFrequently: true });
+    const bitmap =
+      data instanceof ArrayBuffer
+        ? await createImageBitmap(new Blob([data], { type: color.media_type }))
+        : "bitmap" in data
+          ? data.bitmap
+          : null;
+    const context = Object.assign(document.createElement("canvas"), { width: SIDE_PX, height: SIDE_PX }).getContext("2d", {
+      willReadFrequently: true,
+    });
     if (!bitmap || !context) return null;
     context.drawImage(bitmap, 0, 0, SIDE_PX, SIDE_PX);
     bitmap.close();
     const { data: pixels } = context.getImageData(0, 0, SIDE_PX, SIDE_PX);
-    return computeHaze(Uint8Array.from({ length: SIDE_PX * SIDE_PX }, (_, k) => (pixels[4 * k + 3] ?? 0) > 127 ? 1 : 0), SIDE_PX);
+    return computeHaze(
+      Uint8Array.from({ length: SIDE_PX * SIDE_PX }, (_, k) => ((pixels[4 * k + 3] ?? 0) > 127 ? 1 : 0)),
+      SIDE_PX,
+    );
   }
 
   /** Colours background and haze: the page's paper in the light of the sky. High contrast keeps its own colours. */
   #color(): void {
     const plain = matchMedia("(prefers-contrast: more), (forced-colors: active)").matches;
-    const paper = (getComputedStyle(document.documentElement).getPropertyValue("--paper").trim().match(/[0-9a-f]{2}/gi) ?? []).map((part) => parseInt(part, 16));
+    const paper = (
+      getComputedStyle(document.documentElement)
+        .getPropertyValue("--paper")
+        .trim()
+        .match(/[0-9a-f]{2}/gi) ?? []
+    ).map((part) => parseInt(part, 16));
     this.#rgb = paper.map((part, k) => Math.round(part * Math.min(this.#view.light.sky_rgb[k as 0], 1) ** 2));
     this.#canvas.hidden = plain || paper.length < 3;
     if (this.#canvas.hidden) return;
@@ -103,6 +128,8 @@ export class Haze {
 /** Fills a canvas with a colour of the opacity of a mask. */
 function fill(canvas: HTMLCanvasElement, mask: Uint8ClampedArray, rgb: Rgb): void {
   const image = new ImageData(SIDE_PX, SIDE_PX);
-  mask.forEach((alpha, k) => { image.data.set([...rgb, alpha], 4 * k); });
+  mask.forEach((alpha, k) => {
+    image.data.set([...rgb, alpha], 4 * k);
+  });
   canvas.getContext("2d")?.putImageData(image, 0, 0);
 }

@@ -35,7 +35,8 @@ function clearTowers(haze: Uint8ClampedArray, outside: Uint8Array, side: number,
     }) as [number | null, number | null];
     if (left === null || right === null || right - left > window) continue;
     const edge = Math.min(topAt(left), topAt(right));
-    for (let y = topAt(x); y < edge + window && (haze[y * side + x] ?? 0) > 0; y++) for (const near of [x - 1, x, x + 1]) if (near >= 0 && near < side) cleared[y * side + near] = 0;
+    for (let y = topAt(x); y < edge + window && (haze[y * side + x] ?? 0) > 0; y++)
+      for (const near of [x - 1, x, x + 1]) if (near >= 0 && near < side) cleared[y * side + near] = 0;
   }
   haze.set(cleared);
 }
@@ -50,10 +51,23 @@ function findOutside(inside: Uint8Array, side: number): Uint8Array {
     outside[at] = 1;
     open.push(at);
   };
-  for (let k = 0; k < side; k++) for (const [x, y] of [[k, 0], [k, side - 1], [0, k], [side - 1, k]] as const) visit(x, y);
+  for (let k = 0; k < side; k++)
+    for (const [x, y] of [
+      [k, 0],
+      [k, side - 1],
+      [0, k],
+      [side - 1, k],
+    ] as const)
+      visit(x, y);
   for (let at = open.pop(); at !== undefined; at = open.pop()) {
     const [x, y] = [at % side, Math.floor(at / side)];
-    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]] as const) visit(x + dx, y + dy);
+    for (const [dx, dy] of [
+      [1, 0],
+      [-1, 0],
+      [0, 1],
+      [0, -1],
+    ] as const)
+      visit(x + dx, y + dy);
   }
   return outside;
 }
@@ -61,7 +75,7 @@ function findOutside(inside: Uint8Array, side: number): Uint8Array {
 /** Computes distances from the outside and from the border, in pixels, by a chamfer of two passes. */
 function computeDistances(outside: Uint8Array, side: number): Float32Array {
   const distances = Float32Array.from(outside, (is) => (is === 1 ? 0 : Infinity));
-  const at = (x: number, y: number): number => (x < 0 || y < 0 || x >= side || y >= side ? 0 : distances[y * side + x] ?? 0);
+  const at = (x: number, y: number): number => (x < 0 || y < 0 || x >= side || y >= side ? 0 : (distances[y * side + x] ?? 0));
   for (const step of [1, -1]) {
     for (let k = 0; k < distances.length; k++) {
       const index = step > 0 ? k : distances.length - 1 - k;

@@ -111,7 +111,8 @@ const EN = {
   no: "No",
   close: "Close",
   mapFailed: "Couldn’t open this map",
-  noRanges: "This web server sends files only as a whole. The map needs one that serves range requests, such as nginx, Apache, Caddy or IIS.",
+  noRanges:
+    "This web server sends files only as a whole. The map needs one that serves range requests, such as nginx, Apache, Caddy or IIS.",
   pageFailed: "Couldn’t open this page",
 };
 
@@ -232,7 +233,8 @@ const DE: Messages = {
   no: "Nein",
   close: "Schließen",
   mapFailed: "Diese Karte konnte nicht geöffnet werden",
-  noRanges: "Dieser Webserver sendet Dateien nur als Ganzes. Die Karte benötigt einen mit Range-Anfragen, etwa nginx, Apache, Caddy oder IIS.",
+  noRanges:
+    "Dieser Webserver sendet Dateien nur als Ganzes. Die Karte benötigt einen mit Range-Anfragen, etwa nginx, Apache, Caddy oder IIS.",
   pageFailed: "Diese Seite konnte nicht geöffnet werden",
 };
 
@@ -349,7 +351,8 @@ const FR: Messages = {
   no: "Non",
   close: "Fermer",
   mapFailed: "Impossible d’ouvrir cette carte",
-  noRanges: "Ce serveur web n’envoie que des fichiers entiers. La carte a besoin de requêtes partielles (Range), comme avec nginx, Apache, Caddy ou IIS.",
+  noRanges:
+    "Ce serveur web n’envoie que des fichiers entiers. La carte a besoin de requêtes partielles (Range), comme avec nginx, Apache, Caddy ou IIS.",
   pageFailed: "Impossible d’ouvrir cette page",
 };
 
@@ -370,18 +373,24 @@ export const MESSAGE_KEYS: ReadonlySet<string> = new Set(Object.keys(EN));
 export const message = (key: keyof Messages): string => messages[key];
 
 /** Returns a message and what it introduces, such as the reason of an error. */
-export const introduce = (key: keyof Messages, what: unknown): string => `${message(key)}${messages === FR ? "\u00a0" : ""}: ${what instanceof Error ? what.message : String(what)}`;
+export const introduce = (key: keyof Messages, what: unknown): string =>
+  `${message(key)}${messages === FR ? "\u00a0" : ""}: ${what instanceof Error ? what.message : String(what)}`;
 
 /** Translates the markup: `data-i18n` sets text, `data-i18n-label` the accessible name (and the tooltip, if there is one), `data-i18n-placeholder` the placeholder. */
 export function translatePage(page: ParentNode = document): void {
   document.documentElement.lang = language;
   const each = (attribute: string, apply: (element: HTMLElement, text: string) => void): void => {
-    for (const element of page.querySelectorAll<HTMLElement>(`[data-${attribute}]`)) apply(element, message(element.getAttribute(`data-${attribute}`) as keyof Messages));
+    for (const element of page.querySelectorAll<HTMLElement>(`[data-${attribute}]`))
+      apply(element, message(element.getAttribute(`data-${attribute}`) as keyof Messages));
   };
-  each("i18n", (element, text) => { element.textContent = text; });
+  each("i18n", (element, text) => {
+    element.textContent = text;
+  });
   each("i18n-label", (element, text) => {
     element.setAttribute("aria-label", text);
     if (element.hasAttribute("title")) element.title = text;
   });
-  each("i18n-placeholder", (element, text) => { element.setAttribute("placeholder", text); });
+  each("i18n-placeholder", (element, text) => {
+    element.setAttribute("placeholder", text);
+  });
 }

@@ -18,12 +18,25 @@ export function bindInViewList(view: map, layer: () => imageLayer, select: (id: 
   };
   button.hidden = false;
   button.addEventListener("click", () => {
-    objectsInView(view, layer()).then((rows) => {
-      box.replaceChildren(withText("h2", message("inView")), rows.length > 0 ? listOf(rows, (id) => { close(); select(id); }) : withText("p", message("noObjects"), "note"));
-      box.hidden = false;
-      button.setAttribute("aria-expanded", "true");
-      (box.querySelector("button") ?? box).focus();
-    }, (reason: unknown) => { report(reason); });
+    objectsInView(view, layer()).then(
+      (rows) => {
+        box.replaceChildren(
+          withText("h2", message("inView")),
+          rows.length > 0
+            ? listOf(rows, (id) => {
+                close();
+                select(id);
+              })
+            : withText("p", message("noObjects"), "note"),
+        );
+        box.hidden = false;
+        button.setAttribute("aria-expanded", "true");
+        (box.querySelector("button") ?? box).focus();
+      },
+      (reason: unknown) => {
+        report(reason);
+      },
+    );
   });
   box.addEventListener("keydown", (event) => {
     if (event.key !== "Escape") return;
@@ -39,7 +52,9 @@ type Row = readonly [id: number, name: string];
 async function objectsInView(view: map, layer: imageLayer): Promise<Row[]> {
   const visible = (await view.objectsInView()).filter((object) => object.layer === layer).slice(0, MAX_PARTS);
   const wholes = await Promise.all(visible.map(({ id }) => findWhole<Described>(layer, { id })));
-  const named = wholes.filter((whole) => !NOT_HIGHLIGHTED.has(whole.class ?? "")).map((whole) => [whole.id, describe(whole).title] as const);
+  const named = wholes
+    .filter((whole) => !NOT_HIGHLIGHTED.has(whole.class ?? ""))
+    .map((whole) => [whole.id, describe(whole).title] as const);
   return [...new Map(named)].slice(0, MAX_ROWS);
 }
 
@@ -48,7 +63,9 @@ function listOf(rows: readonly Row[], select: (id: number) => void): HTMLElement
   for (const [id, name] of rows) {
     const button = withText("button", name);
     button.type = "button";
-    button.addEventListener("click", () => { select(id); });
+    button.addEventListener("click", () => {
+      select(id);
+    });
     const row = document.createElement("li");
     row.append(button);
     list.append(row);

@@ -35,7 +35,14 @@ export class InfoPanel {
     const card = describe(event, this.units, event.position && this.lonLat(event.position));
     const all = withText("details", "");
     all.append(withText("summary", message("allData")), listOf(card.details), copyButton(card));
-    this.#box.replaceChildren(withText("h2", card.title), ...(showBack ? [behindButton(showBack)] : []), withText("p", card.note, "note"), listOf(card.rows), all, this.#closeButton());
+    this.#box.replaceChildren(
+      withText("h2", card.title),
+      ...(showBack ? [behindButton(showBack)] : []),
+      withText("p", card.note, "note"),
+      listOf(card.rows),
+      all,
+      this.#closeButton(),
+    );
     this.#box.hidden = false;
     this.#box.scrollTop = 0;
     return card.title;
@@ -77,7 +84,14 @@ function copyButton({ title, rows, details }: Card): HTMLButtonElement {
   button.type = "button";
   button.addEventListener("click", () => {
     const text = [title, ...[...rows, ...details].map(([name, value]) => `${name}\t${value}`)].join("\n");
-    navigator.clipboard.writeText(text).then(() => { toast(message("copied")); }, (reason: unknown) => { report(reason); });
+    navigator.clipboard.writeText(text).then(
+      () => {
+        toast(message("copied"));
+      },
+      (reason: unknown) => {
+        report(reason);
+      },
+    );
   });
   return button;
 }

@@ -20,7 +20,11 @@ export function bindLight(view: map, layer: imageLayer, first?: Date): void {
   if (!rendering) return;
   const [time, sun] = [inputById("time"), byId("sun")];
   if (rendering.json.geographic) bindDay(view, rendering, first);
-  else time.addEventListener("input", () => { showClock(time.valueAsNumber); view.setLight(lightAt(time.valueAsNumber)); });
+  else
+    time.addEventListener("input", () => {
+      showClock(time.valueAsNumber);
+      view.setLight(lightAt(time.valueAsNumber));
+    });
   bindShadows(view, rendering);
   bindPlay(time);
   byId("modes").addEventListener("change", () => {
@@ -32,7 +36,8 @@ export function bindLight(view: map, layer: imageLayer, first?: Date): void {
 
 function bindDay(view: map, rendering: Rendering, requested: Date | undefined): void {
   const [time, day] = [inputById("time"), inputById("day")];
-  const zone = (): number => chooseUtcOffset(rendering.json.geographic?.lon_lat[0] ?? 0, -new Date(`${day.value}T12:00`).getTimezoneOffset() / 60);
+  const zone = (): number =>
+    chooseUtcOffset(rendering.json.geographic?.lon_lat[0] ?? 0, -new Date(`${day.value}T12:00`).getTimezoneOffset() / 60);
   const moment = (hour: number): Date => new Date(Date.parse(`${day.value}T00:00Z`) + (hour - zone()) * 3_600_000);
   const show = (hour = time.valueAsNumber): void => {
     if (day.value === "") return;
@@ -50,8 +55,12 @@ function bindDay(view: map, rendering: Rendering, requested: Date | undefined): 
   const local = new Date(first.getTime() + zone() * 3_600_000);
   day.value = local.toISOString().slice(0, 10);
   let dragged = false;
-  time.addEventListener("pointerdown", () => { dragged = true; });
-  time.addEventListener("keydown", () => { dragged = false; });
+  time.addEventListener("pointerdown", () => {
+    dragged = true;
+  });
+  time.addEventListener("keydown", () => {
+    dragged = false;
+  });
   // Dragging moves in steps of 15 minutes, keys and playing in steps of 5 minutes.
   time.addEventListener("input", ({ isTrusted }) => {
     if (dragged && isTrusted) time.valueAsNumber = Math.round(4 * time.valueAsNumber) / 4;
@@ -83,7 +92,9 @@ function showDay(time: HTMLInputElement, { json: { geographic } }: Rendering, mo
 
 /** A morning for which the rendering has shadows; a summer morning if it has none. */
 function firstMoment({ json }: Rendering): Date {
-  const sun = findFirstSun(json.layers.map((layer) => ({ ...layer, suns: layer.suns?.filter(({ time }) => !Number.isNaN(Date.parse(time ?? ""))) ?? [] })));
+  const sun = findFirstSun(
+    json.layers.map((layer) => ({ ...layer, suns: layer.suns?.filter(({ time }) => !Number.isNaN(Date.parse(time ?? ""))) ?? [] })),
+  );
   if (sun?.time) return new Date(sun.time);
   const [lon, lat] = json.geographic?.lon_lat ?? [0, 0];
   return new Date(Date.UTC(new Date().getFullYear(), lat < 0 ? 11 : 5, 21) + (FIRST_HOUR - lon / 15) * 3_600_000);

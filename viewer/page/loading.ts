@@ -8,8 +8,12 @@ const DELAY_MS = 400;
 export function bindLoading(view: map): void {
   const bar = byId("loading");
   let since_ms: number | null = performance.now();
-  view.on("move", () => { since_ms ??= performance.now(); });
-  view.on("idle", () => { since_ms = null; });
+  view.on("move", () => {
+    since_ms ??= performance.now();
+  });
+  view.on("idle", () => {
+    since_ms = null;
+  });
   setInterval(() => {
     if (view.isTurning) since_ms ??= performance.now();
     const waits = since_ms !== null && performance.now() - since_ms >= DELAY_MS && navigator.onLine;

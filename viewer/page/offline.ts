@@ -7,18 +7,34 @@ import { language, introduce, message } from "./i18n";
 type Offline = typeof import("./map3d-offline.module.js");
 
 /** All files that this page loads, at once or on demand. */
-export const PAGE_FILES = ["start.js", "page.js", "page-share.js", "page.css", "map3d.module.js", ...["compare", "controls", "measure", "offline", "orbit", "print", "shade", "theme"].map((name) => `map3d-${name}.module.js`)];
+export const PAGE_FILES = [
+  "start.js",
+  "page.js",
+  "page-share.js",
+  "page.css",
+  "map3d.module.js",
+  ...["compare", "controls", "measure", "offline", "orbit", "print", "shade", "theme"].map((name) => `map3d-${name}.module.js`),
+];
 
 /** Binds the dialog that saves the current view for offline use. Stores nothing until the user saves an area. */
 export function bindOffline(view: map, name: string): void {
   if (!isSecureContext || !("serviceWorker" in navigator)) return;
-  const [button, dialog, details] = [byId("save-offline"), byId("offline") as HTMLDialogElement, byId("offline-details") as HTMLSelectElement];
+  const [button, dialog, details] = [
+    byId("save-offline"),
+    byId("offline") as HTMLDialogElement,
+    byId("offline-details") as HTMLSelectElement,
+  ];
   button.hidden = false;
   button.addEventListener("click", () => {
-    import("./map3d-offline.module.js").then((offline) => {
-      opened ??= new OfflineDialog(view, name, offline, dialog, details);
-      opened.open();
-    }, (reason: unknown) => { toast(introduce("toolFailed", reason)); });
+    import("./map3d-offline.module.js").then(
+      (offline) => {
+        opened ??= new OfflineDialog(view, name, offline, dialog, details);
+        opened.open();
+      },
+      (reason: unknown) => {
+        toast(introduce("toolFailed", reason));
+      },
+    );
   });
   let opened: OfflineDialog | undefined;
 }
@@ -39,7 +55,10 @@ class OfflineDialog {
       this.#request++;
       this.#download?.abort();
     });
-    byId("offline-save").addEventListener("click", () => void this.#save({ name: `${this.#name} ${new Date().toISOString()}`, ...this.#downloadOptions() }));
+    byId("offline-save").addEventListener(
+      "click",
+      () => void this.#save({ name: `${this.#name} ${new Date().toISOString()}`, ...this.#downloadOptions() }),
+    );
   }
 
   open(): void {
@@ -78,7 +97,12 @@ class OfflineDialog {
     this.#setBusy(true);
     try {
       await this.#offline.registerWorker();
-      await this.#offline.downloadArea(this.#view, { ...options, files: [location.pathname, ...PAGE_FILES], signal, onProgress: progressBar() });
+      await this.#offline.downloadArea(this.#view, {
+        ...options,
+        files: [location.pathname, ...PAGE_FILES],
+        signal,
+        onProgress: progressBar(),
+      });
       toast(message("saved"));
       this.#dialog.close();
     } catch (reason) {
@@ -131,7 +155,10 @@ function progressBar(): (progress: AreaProgress) => void {
     const seconds = (performance.now() - start) / 1000;
     const seconds_left = (seconds * (total - done)) / done;
     const time = seconds_left < 90 ? unit(Math.ceil(seconds_left), "second") : unit(Math.ceil(seconds_left / 60), "minute");
-    showProgress(done / total, seconds < 1 ? "" : [unit(bytes / 1e6 / seconds, "megabyte-per-second", 1), message("timeLeft").replace("%", time)].join(" · "));
+    showProgress(
+      done / total,
+      seconds < 1 ? "" : [unit(bytes / 1e6 / seconds, "megabyte-per-second", 1), message("timeLeft").replace("%", time)].join(" · "),
+    );
   };
 }
 
@@ -148,5 +175,7 @@ function action(text: string, label: string, onClick: () => void): HTMLElement {
   return button;
 }
 
-const unit = (value: number, name: string, maximumFractionDigits = 0): string => value.toLocaleString(language, { style: "unit", unit: name, maximumFractionDigits });
-const size = (bytes: number): string => (bytes < 1e9 ? unit(bytes / 1e6, "megabyte", bytes < 1e7 ? 1 : 0) : unit(bytes / 1e9, "gigabyte", bytes < 1e10 ? 1 : 0));
+const unit = (value: number, name: string, maximumFractionDigits = 0): string =>
+  value.toLocaleString(language, { style: "unit", unit: name, maximumFractionDigits });
+const size = (bytes: number): string =>
+  bytes < 1e9 ? unit(bytes / 1e6, "megabyte", bytes < 1e7 ? 1 : 0) : unit(bytes / 1e9, "gigabyte", bytes < 1e10 ? 1 : 0);

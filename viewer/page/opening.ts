@@ -19,7 +19,8 @@ const SEEN = "map3d-opening";
 export function bindOpening(view: map, turn: orbit): void {
   const pitch = view.directions.find(({ id }) => id === view.direction)?.pitchDeg;
   const directions = view.directions.filter(({ pitchDeg }) => pitchDeg === pitch);
-  if (directions.length < MIN_DIRECTIONS || view.drawer !== "webgl" || view.options.dataSaver || prefersReducedMotion() || wasSeen()) return;
+  if (directions.length < MIN_DIRECTIONS || view.drawer !== "webgl" || view.options.dataSaver || prefersReducedMotion() || wasSeen())
+    return;
   let [stopped, turned, last] = [false, 0, 0];
   const stop = (): void => {
     stopped = true;

@@ -19,19 +19,33 @@ export function openShareDialog(message: Message): void {
   const form = document.createElement("form");
   form.method = "dialog";
   const actions = withText("div", "", "actions");
-  if ("share" in navigator) actions.append(button(message("send"), () => { navigator.share({ title: document.title, url: link }).catch(() => undefined); }));
+  if ("share" in navigator)
+    actions.append(
+      button(message("send"), () => {
+        navigator.share({ title: document.title, url: link }).catch(() => undefined);
+      }),
+    );
   const close = withText("button", message("close"), "main");
   actions.append(close);
-  form.append(title, copyable(message, "link", "share-link", link), copyable(message, "embedCode", "share-embed", iframeCode(link)), createQr(link, message("qrCode")), actions);
+  form.append(
+    title,
+    copyable(message, "link", "share-link", link),
+    copyable(message, "embedCode", "share-embed", iframeCode(link)),
+    createQr(link, message("qrCode")),
+    actions,
+  );
   dialog.append(form);
-  dialog.addEventListener("close", () => { dialog.remove(); });
+  dialog.addEventListener("close", () => {
+    dialog.remove();
+  });
   document.body.append(dialog);
   dialog.showModal();
 }
 
 const escaped = (text: string): string => text.replaceAll("&", "&amp;").replaceAll('"', "&quot;").replaceAll("<", "&lt;");
 
-const iframeCode = (link: string): string => `<iframe src="${escaped(link)}" title="${escaped(document.title)}" width="800" height="500" style="border:0" loading="lazy" allowfullscreen></iframe>`;
+const iframeCode = (link: string): string =>
+  `<iframe src="${escaped(link)}" title="${escaped(document.title)}" width="800" height="500" style="border:0" loading="lazy" allowfullscreen></iframe>`;
 
 function button(text: string, act: () => void): HTMLButtonElement {
   const created = withText("button", text);
@@ -44,9 +58,18 @@ function button(text: string, act: () => void): HTMLButtonElement {
 function copyable(message: Message, label: MessageKey, id: string, value: string): HTMLElement {
   const [row, name, field] = [withText("div", "", "share-row"), withText("label", message(label)), document.createElement("input")];
   [name.htmlFor, field.id, field.readOnly, field.value] = [id, id, true, value];
-  field.addEventListener("focus", () => { field.select(); });
+  field.addEventListener("focus", () => {
+    field.select();
+  });
   const copy = button(message("copy"), () => {
-    navigator.clipboard.writeText(value).then(() => { copy.textContent = message("copiedShort"); }, () => { field.select(); });
+    navigator.clipboard.writeText(value).then(
+      () => {
+        copy.textContent = message("copiedShort");
+      },
+      () => {
+        field.select();
+      },
+    );
   });
   copy.id = `${id}-copy`;
   row.append(name, field, copy);
@@ -58,7 +81,14 @@ function createQr(text: string, label: string): SVGSVGElement {
   const code = generate(text, { minCorrectionLevel: correction.M });
   const svg = document.createElementNS(NS, "svg");
   const side = String(code.size + 2 * QUIET);
-  for (const [name, value] of Object.entries({ viewBox: `${String(-QUIET)} ${String(-QUIET)} ${side} ${side}`, class: "share-qr", role: "img", "aria-label": label, "shape-rendering": "crispEdges" })) svg.setAttribute(name, value);
+  for (const [name, value] of Object.entries({
+    viewBox: `${String(-QUIET)} ${String(-QUIET)} ${side} ${side}`,
+    class: "share-qr",
+    role: "img",
+    "aria-label": label,
+    "shape-rendering": "crispEdges",
+  }))
+    svg.setAttribute(name, value);
   const path = document.createElementNS(NS, "path");
   let shape = "";
   for (let y = 0; y < code.size; y++) for (let x = 0; x < code.size; x++) if (code.get(x, y)) shape += `M${String(x)} ${String(y)}h1v1h-1z`;

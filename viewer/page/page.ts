@@ -38,10 +38,14 @@ function open(): void {
   const view = new map("mapcanvas", { cover: true, light: lightAt(FIRST_HOUR), ...start });
   const urls = baseUrls();
   const layer = new imageLayer(urls);
-  const info = new InfoPanel(byId("info"), () => { selection.clear(); });
+  const info = new InfoPanel(byId("info"), () => {
+    selection.clear();
+  });
   const permalink = new Permalink(view);
   const selection = new Selection(view, layer, info, permalink);
-  view.on("error", ({ error }) => { showError(layer, error); });
+  view.on("error", ({ error }) => {
+    showError(layer, error);
+  });
   let tools: Tools | undefined;
   view.on("click", (event) => {
     if (!tools?.active) selection.select(event);
@@ -52,7 +56,8 @@ function open(): void {
     permalink.by = by ?? "";
     const colors = new Colors(view, layer, permalink);
     let haze: Haze | undefined;
-    if (layer.rendering) bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme, overlay: (paper) => haze?.capture(paper) });
+    if (layer.rendering)
+      bindPicture({ view, json: layer.rendering.json, legend: () => colors.theme, overlay: (paper) => haze?.capture(paper) });
     if (layer.rendering) bindOffline(view, layer.rendering.json.name);
     colors.open().catch(report);
     loadEntries(view, layer, isFresh).catch(report);
@@ -68,8 +73,16 @@ function open(): void {
     if (layer.rendering?.layers.has("depth")) tools = new Tools(view);
     // Epochs can end elsewhere.
     if (others.length === 0) haze = new Haze(view, layer);
-    const compare = new Compare({ view, hasHaze: others.length === 0, onClick: (event) => { selection.select(event); } });
-    selection.onChange = () => { compare.highlight(); };
+    const compare = new Compare({
+      view,
+      hasHaze: others.length === 0,
+      onClick: (event) => {
+        selection.select(event);
+      },
+    });
+    selection.onChange = () => {
+      compare.highlight();
+    };
   });
   showThumbnail(view, layer);
   layer.addTo(view);
@@ -79,16 +92,19 @@ function open(): void {
 /** Adds what the page does not need for its first picture. @param opens whether the map begins with a turn around the content */
 async function loadEntries(view: map, layer: imageLayer, opens: boolean): Promise<void> {
   // Depth is as large as colours and normals: it loads after the first picture.
-  if (layer.rendering?.layers.has("depth") && !view.options.dataSaver) view.once("load", () => {
-    import("./map3d-shade.module.js").then(({ shade }) => {
-      new shade().addTo(view);
-      if (view.drawer === "webgl") showShadowSwitch();
-    }, report);
-    import("./map3d-orbit.module.js").then(({ orbit }) => {
-      const turn = new orbit().addTo(view);
-      if (opens) bindOpening(view, turn);
-    }).catch(report);
-  });
+  if (layer.rendering?.layers.has("depth") && !view.options.dataSaver)
+    view.once("load", () => {
+      import("./map3d-shade.module.js").then(({ shade }) => {
+        new shade().addTo(view);
+        if (view.drawer === "webgl") showShadowSwitch();
+      }, report);
+      import("./map3d-orbit.module.js")
+        .then(({ orbit }) => {
+          const turn = new orbit().addTo(view);
+          if (opens) bindOpening(view, turn);
+        })
+        .catch(report);
+    });
   const { locate, overview } = await import("./map3d-controls.module.js");
   if (layer.rendering?.json.geographic) new locate().addTo(view);
   bindOverview(view, new overview({ collapsed: true }).addTo(view));
@@ -103,7 +119,10 @@ function showError(layer: imageLayer, error: Error): void {
     return;
   }
   showFailure(message("mapFailed"), ignoresRanges ? message("noRanges") : error.message);
-  if (!navigator.onLine) addEventListener("online", () => { location.reload(); });
+  if (!navigator.onLine)
+    addEventListener("online", () => {
+      location.reload();
+    });
 }
 
 /** Zoom levels above the lowest at which the overview opens, on wide screens: about one quarter of the scene is in view. */
@@ -140,8 +159,16 @@ function bindPage(view: map, layer: imageLayer, info: InfoPanel, selection: Sele
   bindLight(view, layer, time);
   bindModes(layer);
   if (json.objects) {
-    bindInViewList(view, () => selection.layer, (id) => void selection.selectId(id));
-    bindSearch(view, () => selection.layer, (id, position, zoom) => void selection.goTo(id, position, zoom));
+    bindInViewList(
+      view,
+      () => selection.layer,
+      (id) => void selection.selectId(id),
+    );
+    bindSearch(
+      view,
+      () => selection.layer,
+      (id, position, zoom) => void selection.goTo(id, position, zoom),
+    );
   }
 }
 

@@ -26,7 +26,12 @@ export function readPermalink(hash: string): PermalinkState {
   const numbers = [x, y, z, zoom].map(Number);
   if (!direction || !x || !y || !z || !zoom || !numbers.every(Number.isFinite)) return {};
   const value = (name: string): string | undefined => more.find((part) => part.startsWith(`${name}=`))?.slice(name.length + 1);
-  const [time, epoch, id, by] = [new Date(value("t") ?? ""), Number(value("epoch") ?? ""), Number(value("id") ?? ""), decoded(value("by") ?? "")];
+  const [time, epoch, id, by] = [
+    new Date(value("t") ?? ""),
+    Number(value("epoch") ?? ""),
+    Number(value("id") ?? ""),
+    decoded(value("by") ?? ""),
+  ];
   return {
     direction,
     center: numbers.slice(0, 3) as unknown as Vec3,
@@ -52,11 +57,17 @@ export class Permalink {
 
   constructor(view: map) {
     this.#view = view;
-    view.on("moveend", () => { this.write(); });
-    view.on("directionchange", () => { this.write(); });
+    view.on("moveend", () => {
+      this.write();
+    });
+    view.on("directionchange", () => {
+      this.write();
+    });
     view.on("lightchange", () => {
       clearTimeout(this.#timer);
-      this.#timer = window.setTimeout(() => { this.write(); }, THROTTLE_MS);
+      this.#timer = window.setTimeout(() => {
+        this.write();
+      }, THROTTLE_MS);
     });
   }
 

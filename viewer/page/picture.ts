@@ -6,7 +6,10 @@ import { language, introduce, message } from "./i18n";
 type PaperSize = readonly [long: number, short: number];
 
 /** Paper sizes at 300 dpi, pixels. */
-const PAPERS: readonly (readonly [name: string, size: PaperSize])[] = [["A4", [3508, 2480]], ["A3", [4961, 3508]]];
+const PAPERS: readonly (readonly [name: string, size: PaperSize])[] = [
+  ["A4", [3508, 2480]],
+  ["A3", [4961, 3508]],
+];
 const SCALES = [1, 2, 4];
 const PAPER_SCALE = 300 / 96;
 const LONGEST_SIDE_PX = 8192;
@@ -44,9 +47,18 @@ export function bindPicture(context: PictureContext): void {
     const { signal } = running;
     showError("");
     setBusy(true);
-    task(size, signal).then(() => { dialog.close(); }, (reason: unknown) => {
-      if (!signal.aborted) showError(introduce("imageFailed", reason));
-    }).finally(() => { setBusy(false); });
+    task(size, signal)
+      .then(
+        () => {
+          dialog.close();
+        },
+        (reason: unknown) => {
+          if (!signal.aborted) showError(introduce("imageFailed", reason));
+        },
+      )
+      .finally(() => {
+        setBusy(false);
+      });
   };
   button.addEventListener("click", () => {
     const at = Math.max(select.selectedIndex, 0);
@@ -58,15 +70,29 @@ export function bindPicture(context: PictureContext): void {
     dialog.showModal();
   });
   select.addEventListener("change", note);
-  dialog.addEventListener("close", () => { running?.abort(); });
-  byId("picture-save").addEventListener("click", () => { run((size, signal) => save(context, size, signal)); });
-  byId("picture-print").addEventListener("click", () => { run((size, signal) => print(context, size, signal)); });
+  dialog.addEventListener("close", () => {
+    running?.abort();
+  });
+  byId("picture-save").addEventListener("click", () => {
+    run((size, signal) => save(context, size, signal));
+  });
+  byId("picture-print").addEventListener("click", () => {
+    run((size, signal) => print(context, size, signal));
+  });
 }
 
 function sizesOf({ clientWidth: width, clientHeight: height }: HTMLCanvasElement): PictureSize[] {
-  const screens = SCALES.map((scale) => ({ name: `${message("screen")} × ${String(scale)}`, width_px: width * scale, height_px: height * scale, textScale: scale }));
+  const screens = SCALES.map((scale) => ({
+    name: `${message("screen")} × ${String(scale)}`,
+    width_px: width * scale,
+    height_px: height * scale,
+    textScale: scale,
+  }));
   const papers = PAPERS.map(([name, [long, short]]) => ({
-    name: `${name}, 300 dpi`, width_px: width < height ? short : long, height_px: width < height ? long : short, textScale: PAPER_SCALE,
+    name: `${name}, 300 dpi`,
+    width_px: width < height ? short : long,
+    height_px: width < height ? long : short,
+    textScale: PAPER_SCALE,
   }));
   return [...screens.filter(({ width_px, height_px }) => Math.max(width_px, height_px) <= LONGEST_SIDE_PX), ...papers];
 }
@@ -87,10 +113,26 @@ function showProgress(fraction: number): void {
   byId("picture-percent").textContent = fraction.toLocaleString(language, { style: "percent" });
 }
 
-async function createPicture({ view, overlay }: PictureContext, { width_px, height_px, textScale }: PictureSize, signal: AbortSignal, more: PictureOptions, paper?: readonly number[]): Promise<Blob> {
+async function createPicture(
+  { view, overlay }: PictureContext,
+  { width_px, height_px, textScale }: PictureSize,
+  signal: AbortSignal,
+  more: PictureOptions,
+  paper?: readonly number[],
+): Promise<Blob> {
   const draw = overlay(paper);
   const { exportPicture } = await import("./map3d-print.module.js");
-  return exportPicture(view, { width_px, height_px, textScale, signal, ...(draw && { overlay: draw }), progress: (done, total) => { showProgress(done / total); }, ...more });
+  return exportPicture(view, {
+    width_px,
+    height_px,
+    textScale,
+    signal,
+    ...(draw && { overlay: draw }),
+    progress: (done, total) => {
+      showProgress(done / total);
+    },
+    ...more,
+  });
 }
 
 async function save(context: PictureContext, size: PictureSize, signal: AbortSignal): Promise<void> {
@@ -100,7 +142,9 @@ async function save(context: PictureContext, size: PictureSize, signal: AbortSig
   link.href = URL.createObjectURL(blob);
   link.download = `${context.json.name}-${context.view.direction}.png`;
   link.click();
-  setTimeout(() => { URL.revokeObjectURL(link.href); }, 60_000);
+  setTimeout(() => {
+    URL.revokeObjectURL(link.href);
+  }, 60_000);
 }
 
 /** Prints the picture with title, legend and attribution on a print-only sheet. */
@@ -114,11 +158,15 @@ async function print(context: PictureContext, size: PictureSize, signal: AbortSi
   sheet.replaceChildren(headOf(context), picture, ...legendOf(context.legend()), footOf(context));
   sheet.classList.toggle("wide", size.width_px >= size.height_px);
   sheet.hidden = false;
-  addEventListener("afterprint", () => {
-    sheet.hidden = true;
-    sheet.replaceChildren();
-    URL.revokeObjectURL(picture.src);
-  }, { once: true });
+  addEventListener(
+    "afterprint",
+    () => {
+      sheet.hidden = true;
+      sheet.replaceChildren();
+      URL.revokeObjectURL(picture.src);
+    },
+    { once: true },
+  );
   window.print();
 }
 

@@ -35,6 +35,10 @@ export function bindPlay(time: HTMLInputElement): void {
     if (hour >= Number(time.max)) toggle(false);
     else requestAnimationFrame(step);
   };
-  button.addEventListener("click", () => { toggle(!playing); });
-  time.addEventListener("input", ({ isTrusted }) => { if (isTrusted) toggle(false); });
+  button.addEventListener("click", () => {
+    toggle(!playing);
+  });
+  time.addEventListener("input", ({ isTrusted }) => {
+    if (isTrusted) toggle(false);
+  });
 }

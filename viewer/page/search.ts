@@ -9,9 +9,14 @@ const ZOOM_BELOW_DEEPEST = 1;
 /** Binds the search box: a combobox over the rendering's search index, of which the first search fetches a part. @param goTo selects the object that the user chooses and flies there */
 export function bindSearch(view: map, layer: () => imageLayer, goTo: (id: number, position: Vec3, zoom: number) => void): void {
   const [form, query, list] = [byId("search"), inputById("query"), byId("results")];
-  const box = new SearchBox(query, list, (text) => layer().search(text), (entry) => {
-    go(view, layer(), entry, goTo);
-  });
+  const box = new SearchBox(
+    query,
+    list,
+    (text) => layer().search(text),
+    (entry) => {
+      go(view, layer(), entry, goTo);
+    },
+  );
   form.hidden = false;
   form.addEventListener("submit", (event) => {
     event.preventDefault();
@@ -34,7 +39,12 @@ class SearchBox {
   #hits: readonly SearchEntry[] = [];
   #at = 0;
 
-  constructor(query: HTMLInputElement, list: HTMLElement, find: (text: string) => Promise<readonly SearchEntry[]>, select: (entry: SearchEntry) => void) {
+  constructor(
+    query: HTMLInputElement,
+    list: HTMLElement,
+    find: (text: string) => Promise<readonly SearchEntry[]>,
+    select: (entry: SearchEntry) => void,
+  ) {
     [this.#query, this.#list, this.#find, this.#select] = [query, list, find, select];
     query.addEventListener("input", () => void this.#update());
     query.addEventListener("focus", () => void this.#update());

@@ -23,7 +23,9 @@ export class Selection {
 
   constructor(view: map, layer: imageLayer, info: InfoPanel, permalink: Permalink) {
     [this.#view, this.#layer, this.#info, this.#permalink] = [view, layer, info, permalink];
-    addEventListener("popstate", () => { this.#restore(); });
+    addEventListener("popstate", () => {
+      this.#restore();
+    });
   }
 
   /** The layer that objects are selected in. */
@@ -40,21 +42,30 @@ export class Selection {
   /** Selects a clicked object, or the building that it is a part of. */
   select(event: ClickEvent): void {
     const number = ++this.#clicks;
-    findWhole(this.#layer, event).catch((reason: unknown) => {
-      report(reason);
-      return event;
-    }).then((whole) => {
-      if (number !== this.#clicks) return;
-      const changed = whole.id !== this.#permalink.id;
-      this.#show(whole);
-      this.#permalink.write(changed);
-    }, report);
+    findWhole(this.#layer, event)
+      .catch((reason: unknown) => {
+        report(reason);
+        return event;
+      })
+      .then((whole) => {
+        if (number !== this.#clicks) return;
+        const changed = whole.id !== this.#permalink.id;
+        this.#show(whole);
+        this.#permalink.write(changed);
+      }, report);
   }
 
   /** Selects an object found by a search and flies there: at once, and beside the card as soon as that is shown. */
   async goTo(id: number, position: Vec3, zoom: number): Promise<void> {
     const approach = new AbortController();
-    for (const type of GESTURES) addEventListener(type, () => { approach.abort(); }, { once: true, capture: true, signal: approach.signal });
+    for (const type of GESTURES)
+      addEventListener(
+        type,
+        () => {
+          approach.abort();
+        },
+        { once: true, capture: true, signal: approach.signal },
+      );
     this.#view.flyTo(position, zoom);
     await this.selectId(id, position, true, true);
     if (!approach.signal.aborted && this.#permalink.id === id) this.#flyClear(position, zoom);
@@ -72,7 +83,8 @@ export class Selection {
     if (this.#permalink.id !== id) return;
     const [low, high] = object?.box ?? [];
     const origin = this.#layer.rendering?.json.origin;
-    const top: Vec3 | null = low && high && origin ? [origin[0] + (low[0] + high[0]) / 2, origin[1] + (low[1] + high[1]) / 2, origin[2] + high[2]] : null;
+    const top: Vec3 | null =
+      low && high && origin ? [origin[0] + (low[0] + high[0]) / 2, origin[1] + (low[1] + high[1]) / 2, origin[2] + high[2]] : null;
     const event: ClickEvent = { id, position: position ?? top, approximate: false, layer: this.#layer, point: [0, 0], ...(object ?? {}) };
     const title = this.#show(event, pin);
     if (pin && event.position) this.#pin = new marker(title, event.position).addTo(this.#view).select();
@@ -130,14 +142,23 @@ export class Selection {
     const { directions, direction, lookAt_deg } = this.#view;
     const pitch = directions.find((view) => view.id === direction)?.pitchDeg;
     const opposite = directions.find(({ lookAtDeg, pitchDeg }) => pitchDeg === pitch && (lookAtDeg + 180) % 360 === lookAt_deg % 360);
-    return opposite && (() => {
-      const origin = this.#layer.rendering?.json.origin;
-      this.#layer.object(id).then((object) => {
-        const [low, high] = object?.box ?? [];
-        const middle = low && high && origin ? ([0, 1, 2] as const).map((k) => origin[k] + (low[k] + high[k]) / 2) as unknown as Vec3 : position;
-        this.#view.setDirection(opposite.id, middle);
-      }, (reason: unknown) => { report(reason); });
-    });
+    return (
+      opposite &&
+      (() => {
+        const origin = this.#layer.rendering?.json.origin;
+        this.#layer.object(id).then(
+          (object) => {
+            const [low, high] = object?.box ?? [];
+            const middle =
+              low && high && origin ? (([0, 1, 2] as const).map((k) => origin[k] + (low[k] + high[k]) / 2) as unknown as Vec3) : position;
+            this.#view.setDirection(opposite.id, middle);
+          },
+          (reason: unknown) => {
+            report(reason);
+          },
+        );
+      })
+    );
   }
 
   /** Applies the URL after the back or forward button. */

@@ -7,18 +7,20 @@
     en: {
       file: "Browsers can’t open this map from a folder on disk. Copy the folder to a web server and open it from there. README.txt has the details.",
       old: "This browser is too old for this map. Use Chrome or Edge 111, Firefox 121, Safari 16.4 or a newer version.",
-      refused: "This map’s script didn’t load. Reload the page. If that doesn’t help, the web server doesn’t send .js files as JavaScript."
+      refused: "This map’s script didn’t load. Reload the page. If that doesn’t help, the web server doesn’t send .js files as JavaScript.",
     },
     de: {
       file: "Browser können diese Karte nicht aus einem Ordner auf der Festplatte öffnen. Kopieren Sie den Ordner auf einen Webserver und öffnen Sie die Karte von dort. README.txt sagt, wie.",
       old: "Dieser Browser ist zu alt für diese Karte. Verwenden Sie Chrome oder Edge 111, Firefox 121, Safari 16.4 oder neuer.",
-      refused: "Das Skript dieser Karte wurde nicht geladen. Laden Sie die Seite neu. Hilft das nicht, sendet der Webserver .js-Dateien nicht als JavaScript."
+      refused:
+        "Das Skript dieser Karte wurde nicht geladen. Laden Sie die Seite neu. Hilft das nicht, sendet der Webserver .js-Dateien nicht als JavaScript.",
     },
     fr: {
       file: "Les navigateurs ne peuvent pas ouvrir cette carte depuis un dossier du disque. Copiez le dossier sur un serveur web et ouvrez-la de là. Voir README.txt.",
       old: "Ce navigateur est trop ancien pour cette carte. Utilisez Chrome ou Edge 111, Firefox 121, Safari 16.4 ou une version plus récente.",
-      refused: "Le script de cette carte n’a pas été chargé. Rechargez la page. Si cela ne suffit pas, le serveur web n’envoie pas les fichiers .js comme JavaScript."
-    }
+      refused:
+        "Le script de cette carte n’a pas été chargé. Rechargez la page. Si cela ne suffit pas, le serveur web n’envoie pas les fichiers .js comme JavaScript.",
+    },
   };
   var NEEDED = ["DecompressionStream", "ResizeObserver", "Worker", "AbortController", "structuredClone"];
   var languages = navigator.languages || [navigator.language || "en"];
@@ -36,11 +38,16 @@
   function show(reason) {
     if (shown) return;
     shown = true;
-    var found = texts(), box = document.createElement("div"), picture = document.createElement("img"), sentence = document.createElement("p");
+    var found = texts(),
+      box = document.createElement("div"),
+      picture = document.createElement("img"),
+      sentence = document.createElement("p");
     box.className = "closed";
     box.lang = found.language;
     picture.alt = "";
-    picture.onerror = function () { box.removeChild(picture); };
+    picture.onerror = function () {
+      box.removeChild(picture);
+    };
     picture.src = "preview.jpg";
     sentence.setAttribute("role", "alert");
     sentence.appendChild(document.createTextNode(found.of[isFile ? "file" : reason]));
@@ -63,7 +70,9 @@
   }
 
   addEventListener("error", onError, true);
-  addEventListener("load", function () { removeEventListener("error", onError, true); });
+  addEventListener("load", function () {
+    removeEventListener("error", onError, true);
+  });
   var late = document.getElementById("late");
   if (late) late.parentNode.removeChild(late);
   if (isFile || lacks()) show("old");

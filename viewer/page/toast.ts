@@ -40,7 +40,9 @@ export function report(reason: unknown): void {
 /** Says once when the network goes, and again the next time. */
 export function bindNetwork(): void {
   addEventListener("offline", report);
-  addEventListener("online", () => { shown.clear(); });
+  addEventListener("online", () => {
+    shown.clear();
+  });
 }
 
 /** Shows an error in place of the map. */

@@ -8,7 +8,8 @@ const KINDS = ["line", "height", "area", "profile"] as const;
 type Kind = (typeof KINDS)[number];
 
 /** Fingers tap, a mouse clicks. */
-const hintOf = (kind: Kind): string => message(`${kind}Hint`).replace("%", message(matchMedia("(pointer: coarse)").matches ? "tapOn" : "clickOn"));
+const hintOf = (kind: Kind): string =>
+  message(`${kind}Hint`).replace("%", message(matchMedia("(pointer: coarse)").matches ? "tapOn" : "clickOn"));
 
 /** The measuring tool: a button that opens it, the kinds, the results, and buttons that add a point, undo, clear and finish. */
 export class Tools {
@@ -24,14 +25,28 @@ export class Tools {
     this.#buttons = new Map(KINDS.map((kind) => [kind, byId(`measure-${kind}`)]));
     for (const [kind, button] of this.#buttons) button.addEventListener("click", () => void this.#activate(kind));
     byId("measure").hidden = false;
-    const actions = { measure: () => void this.#activate(this.#last), "measure-add": () => { this.#addPoint(); }, "measure-undo": () => this.#tool?.undo(), "measure-clear": () => this.#tool?.clear(), "measure-finish": () => { this.#finish(); } };
+    const actions = {
+      measure: () => void this.#activate(this.#last),
+      "measure-add": () => {
+        this.#addPoint();
+      },
+      "measure-undo": () => this.#tool?.undo(),
+      "measure-clear": () => this.#tool?.clear(),
+      "measure-finish": () => {
+        this.#finish();
+      },
+    };
     for (const [id, act] of Object.entries(actions)) byId(id).addEventListener("click", act);
     // Before the tool's own listener, which would only clear the points.
-    addEventListener("keydown", (event) => {
-      if (event.key !== "Escape" || !this.active || document.querySelector("dialog[open]")) return;
-      event.stopPropagation();
-      this.#finish();
-    }, true);
+    addEventListener(
+      "keydown",
+      (event) => {
+        if (event.key !== "Escape" || !this.active || document.querySelector("dialog[open]")) return;
+        event.stopPropagation();
+        this.#finish();
+      },
+      true,
+    );
   }
 
   /** True while clicks on the map belong to the tool. */
@@ -50,8 +65,14 @@ export class Tools {
     try {
       const entry = await import("./map3d-measure.module.js");
       if (this.#kind !== kind) return;
-      const showResults = (): void => { this.#showResults(); };
-      this.#tool = new entry.measure({ kind }).on("change", showResults).on("face", showResults).on("profile", showResults).addTo(this.#view);
+      const showResults = (): void => {
+        this.#showResults();
+      };
+      this.#tool = new entry.measure({ kind })
+        .on("change", showResults)
+        .on("face", showResults)
+        .on("profile", showResults)
+        .addTo(this.#view);
     } catch (reason) {
       toast(introduce("toolFailed", reason));
     }
@@ -81,11 +102,13 @@ export class Tools {
   /** Shows the results in place of the hint, as soon as there are any. */
   #showResults(): void {
     const results = this.#tool?.results ?? [];
-    byId("measured").replaceChildren(...results.map(([name, value]) => {
-      const row = document.createElement("div");
-      row.append(withText("dt", name), withText("dd", value));
-      return row;
-    }));
+    byId("measured").replaceChildren(
+      ...results.map(([name, value]) => {
+        const row = document.createElement("div");
+        row.append(withText("dt", name), withText("dd", value));
+        return row;
+      }),
+    );
     byId("measured").hidden = results.length === 0;
     byId("hint").hidden = results.length > 0;
     for (const id of ["measure-undo", "measure-clear"]) (byId(id) as HTMLButtonElement).disabled = (this.#tool?.corners.length ?? 0) === 0;

@@ -5,7 +5,8 @@ type Attributes = NonNullable<ClickEvent["attributes"]>;
 export type Described = Pick<ClickEvent, "id" | "name" | "class" | "attributes">;
 
 /** Returns the attributes that another object lacks. */
-const without = (attributes: Attributes = {}, other: Attributes): Attributes => Object.fromEntries(Object.entries(attributes).filter(([name]) => !Object.hasOwn(other, name)));
+const without = (attributes: Attributes = {}, other: Attributes): Attributes =>
+  Object.fromEntries(Object.entries(attributes).filter(([name]) => !Object.hasOwn(other, name)));
 
 /** Returns the outermost object that contains an object, such as the building of a part; attributes that only the part has are added. */
 export async function findWhole<T extends Described>(layer: imageLayer, part: T): Promise<T> {
@@ -16,7 +17,14 @@ export async function findWhole<T extends Described>(layer: imageLayer, part: T)
     const id = object.parent;
     above.add(id);
     object = await layer.object(id);
-    if (object) whole = { ...whole, id, name: object.name, class: object.class, attributes: { ...object.attributes, ...without(whole.attributes, object.attributes) } };
+    if (object)
+      whole = {
+        ...whole,
+        id,
+        name: object.name,
+        class: object.class,
+        attributes: { ...object.attributes, ...without(whole.attributes, object.attributes) },
+      };
   }
   return whole;
 }

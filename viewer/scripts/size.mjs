@@ -35,12 +35,19 @@ const WORKER = 2;
 /** Budget of the core, all entries and the page together. */
 const TOTAL = 167;
 
-const bundles = new Map(["core", ...Object.keys(ENTRIES), "full"].flatMap((name) => ["module.js", "js"].map((end) => [name === "core" ? `map3d.${end}` : `map3d-${name}.${end}`, BUDGET[name] * 1024])));
+const bundles = new Map(
+  ["core", ...Object.keys(ENTRIES), "full"].flatMap((name) =>
+    ["module.js", "js"].map((end) => [name === "core" ? `map3d.${end}` : `map3d-${name}.${end}`, BUDGET[name] * 1024]),
+  ),
+);
 bundles.set("map3d-worker.js", WORKER * 1024);
 const rows = readdirSync(dist)
   .filter((name) => statSync(join(dist, name)).isFile() && !name.endsWith(".d.ts"))
   .map((name) => ({ name, bytes: statSync(join(dist, name)).size, gz: gzipSync(readFileSync(join(dist, name)), { level: 9 }).length }));
-for (const { name, bytes, gz } of rows) console.log(`${name.padEnd(20)} ${String(bytes).padStart(8)} bytes ${String(gz).padStart(7)} gz${bundles.has(name) ? ` of ${bundles.get(name)}` : ""}`);
+for (const { name, bytes, gz } of rows)
+  console.log(
+    `${name.padEnd(20)} ${String(bytes).padStart(8)} bytes ${String(gz).padStart(7)} gz${bundles.has(name) ? ` of ${bundles.get(name)}` : ""}`,
+  );
 
 const over = rows.filter(({ name, gz }) => bundles.has(name) && !(gz <= bundles.get(name))).map(({ name }) => name);
 const scripts = [...bundles.keys()].filter((name) => !name.endsWith(".module.js") && name !== "map3d-worker.js");

@@ -52,7 +52,15 @@ export class cluster extends MapLayer<map, ClusterEvents> {
   #view = "";
   /** Items on the map, by seed and level. */
   #shown = new Map<string, VisibleItem>();
-  #spread: { readonly key: string; readonly markers: readonly marker[]; readonly shifts: readonly Vec2[]; readonly legs: SVGSVGElement; readonly zoom: number } | undefined;
+  #spread:
+    | {
+        readonly key: string;
+        readonly markers: readonly marker[];
+        readonly shifts: readonly Vec2[];
+        readonly legs: SVGSVGElement;
+        readonly zoom: number;
+      }
+    | undefined;
 
   /** @param markers the cluster adds them to the map; do not add them yourself */
   constructor(markers: readonly marker[] = [], options: ClusterOptions = {}) {
@@ -102,7 +110,9 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     const px_m = metresAt(relief, map.zoom);
     const { camera } = relief;
     const [w, h] = [(camera.width / 2 + MARGIN_PX) * px_m, (camera.height / 2 + MARGIN_PX) * px_m];
-    for (const group of this.#groupsAt(relief, level)) if (Math.abs(group.u - camera.u) <= w && Math.abs(group.v - camera.v) <= h) inView.set(`${String(group.members[0])} ${group.members.length > 1 ? String(level) : ""}`, group);
+    for (const group of this.#groupsAt(relief, level))
+      if (Math.abs(group.u - camera.u) <= w && Math.abs(group.v - camera.v) <= h)
+        inView.set(`${String(group.members[0])} ${group.members.length > 1 ? String(level) : ""}`, group);
     for (const [key, { item }] of [...this.#shown]) {
       if (inView.has(key)) continue;
       map.discard(item);
@@ -120,7 +130,9 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     this.#view = view;
     this.#groups.clear();
     this.#uv = new Float64Array(2 * this.#markers.length);
-    this.#markers.forEach((one, k) => { this.#uv.set(uvdFromLocal(camera.frame.axes, sub(positionOf(one), origin)).slice(0, 2), 2 * k); });
+    this.#markers.forEach((one, k) => {
+      this.#uv.set(uvdFromLocal(camera.frame.axes, sub(positionOf(one), origin)).slice(0, 2), 2 * k);
+    });
   }
 
   #groupsAt(relief: Relief, level: number): MarkerGroup[] {
@@ -145,8 +157,14 @@ export class cluster extends MapLayer<map, ClusterEvents> {
   #clusterMarker(map: map, key: string, group: MarkerGroup, markers: readonly marker[]): marker {
     const { label, color } = this.options;
     const count = markers.length.toLocaleString(map.language);
-    const position = [0, 1, 2].map((k) => markers.reduce((sum, one) => sum + (positionOf(one)[k] as number), 0) / markers.length) as unknown as Vec3;
-    const item = new marker(label?.(markers) ?? selectTranslation(MESSAGES, map.language)(count), position, { showLabel: false, icon: element("span", "map3d-cluster", {}, count), ...(color !== undefined && { color }) });
+    const position = [0, 1, 2].map(
+      (k) => markers.reduce((sum, one) => sum + (positionOf(one)[k] as number), 0) / markers.length,
+    ) as unknown as Vec3;
+    const item = new marker(label?.(markers) ?? selectTranslation(MESSAGES, map.language)(count), position, {
+      showLabel: false,
+      icon: element("span", "map3d-cluster", {}, count),
+      ...(color !== undefined && { color }),
+    });
     return item.on("click", () => {
       item.select(false);
       this.fire("click", { markers, position });
@@ -191,7 +209,9 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     const { markers, shifts, legs } = this.#spread;
     markers.forEach((one, k) => {
       const [at, [dx, dy]] = [this.map?.project(positionOf(one)) ?? [0, 0], shifts[k] ?? [0, 0]];
-      Object.entries({ x1: at[0], y1: at[1], x2: at[0] + dx, y2: at[1] + dy }).forEach(([name, value]) => legs.children[k]?.setAttribute(name, value.toFixed(1)));
+      Object.entries({ x1: at[0], y1: at[1], x2: at[0] + dx, y2: at[1] + dy }).forEach(([name, value]) =>
+        legs.children[k]?.setAttribute(name, value.toFixed(1)),
+      );
     });
   }
 
@@ -217,7 +237,8 @@ export class cluster extends MapLayer<map, ClusterEvents> {
 
 /** @throws UsageError for a marker whose position is not known yet */
 function positionOf({ label, position }: marker): Vec3 {
-  if (!position) throw new UsageError(`the position of the marker "${label}" is not known: give [x, y, z], or those that map.findPosition finds`);
+  if (!position)
+    throw new UsageError(`the position of the marker "${label}" is not known: give [x, y, z], or those that map.findPosition finds`);
   return position;
 }
 

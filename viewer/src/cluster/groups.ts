@@ -48,7 +48,8 @@ function pointsNear(uv: Float64Array, cells: Cells, at: number, radius: number):
   const neighbours: number[] = [];
   for (let x = cellOf(u, radius) - 1; x <= cellOf(u, radius) + 1; x++) {
     for (let y = cellOf(v, radius) - 1; y <= cellOf(v, radius) + 1; y++) {
-      for (const other of cells.get(keyOf(x, y)) ?? []) if (other !== at && Math.hypot((uv[2 * other] as number) - u, (uv[2 * other + 1] as number) - v) <= radius) neighbours.push(other);
+      for (const other of cells.get(keyOf(x, y)) ?? [])
+        if (other !== at && Math.hypot((uv[2 * other] as number) - u, (uv[2 * other + 1] as number) - v) <= radius) neighbours.push(other);
     }
   }
   return [at, ...neighbours.sort((a, b) => a - b)];

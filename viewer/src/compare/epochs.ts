@@ -48,8 +48,12 @@ export class epochs extends MapLayer<map, EpochsEvents> {
     this.#fade_ms = fade_ms;
     this.#container = container;
     this.#slider = element("input", "", { type: "range", min: "0", max: String(list.length - 1), step: "1", value: String(shown) });
-    this.#slider.addEventListener("input", () => { this.show(Number(this.#slider.value)); });
-    this.#slider.addEventListener("keydown", (event) => { event.stopPropagation(); });
+    this.#slider.addEventListener("input", () => {
+      this.show(Number(this.#slider.value));
+    });
+    this.#slider.addEventListener("keydown", (event) => {
+      event.stopPropagation();
+    });
     const ends = [list[0], list[list.length - 1]].map((epoch) => element("span", "", {}, epoch?.label ?? ""));
     this.#box = element("div", "map3d-epochs", {}, this.#name, this.#slider, element("div", "", { "aria-hidden": "true" }, ...ends));
   }

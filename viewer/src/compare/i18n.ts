@@ -10,9 +10,24 @@ interface CompareMessages {
 }
 
 const MESSAGES = {
-  en: { divider: "Drag to compare", time: "Time", facing: (wind) => `Facing ${wind}`, headings: ["north", "north-west", "west", "south-west", "south", "south-east", "east", "north-east"] },
-  de: { divider: "Zum Vergleichen ziehen", time: "Zeitpunkt", facing: (wind) => `Blick nach ${wind}`, headings: ["Norden", "Nordwesten", "Westen", "Südwesten", "Süden", "Südosten", "Osten", "Nordosten"] },
-  fr: { divider: "Faites glisser pour comparer", time: "Époque", facing: (wind) => `Vue vers ${wind}`, headings: ["le nord", "le nord-ouest", "l’ouest", "le sud-ouest", "le sud", "le sud-est", "l’est", "le nord-est"] },
+  en: {
+    divider: "Drag to compare",
+    time: "Time",
+    facing: (wind) => `Facing ${wind}`,
+    headings: ["north", "north-west", "west", "south-west", "south", "south-east", "east", "north-east"],
+  },
+  de: {
+    divider: "Zum Vergleichen ziehen",
+    time: "Zeitpunkt",
+    facing: (wind) => `Blick nach ${wind}`,
+    headings: ["Norden", "Nordwesten", "Westen", "Südwesten", "Süden", "Südosten", "Osten", "Nordosten"],
+  },
+  fr: {
+    divider: "Faites glisser pour comparer",
+    time: "Époque",
+    facing: (wind) => `Vue vers ${wind}`,
+    headings: ["le nord", "le nord-ouest", "l’ouest", "le sud-ouest", "le sud", "le sud-est", "l’est", "le nord-est"],
+  },
 } satisfies Record<string, CompareMessages>;
 
 export const getCompareMessages = (language: string): CompareMessages => selectTranslation<CompareMessages>(MESSAGES, language);

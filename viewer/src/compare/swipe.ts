@@ -23,7 +23,8 @@ export type Layers = imageLayer | readonly imageLayer[];
 const ARROWS = "M9 7l-5 5 5 5M15 7l5 5-5 5";
 const STEP = 0.02;
 
-const list = (layers: Layers): readonly imageLayer[] => (Array.isArray(layers) ? (layers as readonly imageLayer[]) : [layers as imageLayer]);
+const list = (layers: Layers): readonly imageLayer[] =>
+  Array.isArray(layers) ? (layers as readonly imageLayer[]) : [layers as imageLayer];
 
 /** Shows some layers left of a divider and others right of it. A pointer or the arrow keys move the divider. Other layers of the map are not clipped. */
 export class swipe extends MapLayer<map, SwipeEvents> {
@@ -37,10 +38,20 @@ export class swipe extends MapLayer<map, SwipeEvents> {
     this.#sides = [list(left), list(right)];
     if (this.#sides[0].some((layer) => this.#sides[1].includes(layer))) throw new UsageError("a layer cannot be on both sides of a swipe");
     this.#at = clamp(at, 0, 1);
-    this.#divider = element("div", "map3d-swipe", { role: "slider", tabindex: "0", "aria-orientation": "horizontal", "aria-valuemin": "0", "aria-valuemax": "100" }, ...(names ?? []).map((name) => element("span", "map3d-swipe-name", {}, name)), icon(ARROWS));
+    this.#divider = element(
+      "div",
+      "map3d-swipe",
+      { role: "slider", tabindex: "0", "aria-orientation": "horizontal", "aria-valuemin": "0", "aria-valuemax": "100" },
+      ...(names ?? []).map((name) => element("span", "map3d-swipe-name", {}, name)),
+      icon(ARROWS),
+    );
     if (names) this.#divider.setAttribute("aria-description", names.join(" | "));
-    this.#divider.addEventListener("pointerdown", (event) => { this.#startDrag(event); });
-    this.#divider.addEventListener("keydown", (event) => { this.#onKeyDown(event); });
+    this.#divider.addEventListener("pointerdown", (event) => {
+      this.#startDrag(event);
+    });
+    this.#divider.addEventListener("keydown", (event) => {
+      this.#onKeyDown(event);
+    });
   }
 
   /** Position of the divider: 0 is the left edge, 1 the right. */
@@ -97,7 +108,16 @@ export class swipe extends MapLayer<map, SwipeEvents> {
   }
 
   #onKeyDown(event: KeyboardEvent): void {
-    const to = { ArrowLeft: this.#at - STEP, ArrowRight: this.#at + STEP, ArrowDown: this.#at - STEP, ArrowUp: this.#at + STEP, PageDown: this.#at - 5 * STEP, PageUp: this.#at + 5 * STEP, Home: 0, End: 1 }[event.key];
+    const to = {
+      ArrowLeft: this.#at - STEP,
+      ArrowRight: this.#at + STEP,
+      ArrowDown: this.#at - STEP,
+      ArrowUp: this.#at + STEP,
+      PageDown: this.#at - 5 * STEP,
+      PageUp: this.#at + 5 * STEP,
+      Home: 0,
+      End: 1,
+    }[event.key];
     if (to === undefined || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     event.stopPropagation();

@@ -35,8 +35,10 @@ export class sync extends Evented<SyncEvents> {
   constructor(maps: readonly map[], { turns_deg = maps.map(() => 0), captions = false }: SyncOptions = {}) {
     super();
     const [first] = maps;
-    if (!first || maps.length < 2 || new Set(maps).size < maps.length) throw new UsageError(`sync needs at least two different maps, got ${String(maps.length)}`);
-    if (turns_deg.length !== maps.length || !turns_deg.every(Number.isFinite)) throw new UsageError(`sync: turns_deg must be a number of degrees for each of the ${String(maps.length)} maps`);
+    if (!first || maps.length < 2 || new Set(maps).size < maps.length)
+      throw new UsageError(`sync needs at least two different maps, got ${String(maps.length)}`);
+    if (turns_deg.length !== maps.length || !turns_deg.every(Number.isFinite))
+      throw new UsageError(`sync: turns_deg must be a number of degrees for each of the ${String(maps.length)} maps`);
     [this.#maps, this.#turns, this.#leader] = [[...maps], turns_deg, first];
     if (captions) adoptStyles(document, STYLES);
     for (const each of maps) {
@@ -66,16 +68,33 @@ export class sync extends Evented<SyncEvents> {
   /** Ends the connection; the maps stay where they are. */
   remove(): this {
     this.#abort.abort();
-    for (const each of this.#maps) each.off("move", this.#follow).off("idle", this.#settle).off("directionchange", this.#follow).off("ready", this.#follow).off("directionchange", this.#describe).off("ready", this.#describe);
+    for (const each of this.#maps)
+      each
+        .off("move", this.#follow)
+        .off("idle", this.#settle)
+        .off("directionchange", this.#follow)
+        .off("ready", this.#follow)
+        .off("directionchange", this.#describe)
+        .off("ready", this.#describe);
     for (const caption of this.#captions.values()) caption.remove();
     return this;
   }
 
   #listen(map: map): void {
     const { signal } = this.#abort;
-    for (const type of TOUCHES) map.container.addEventListener(type, () => { this.lead(map); }, { capture: true, passive: true, signal });
+    for (const type of TOUCHES)
+      map.container.addEventListener(
+        type,
+        () => {
+          this.lead(map);
+        },
+        { capture: true, passive: true, signal },
+      );
     map.on("move", this.#follow).on("directionchange", this.#follow).on("ready", this.#follow).on("idle", this.#settle);
-    map.on("directionchange", this.#describe).on("ready", this.#describe).on("remove", () => this.remove());
+    map
+      .on("directionchange", this.#describe)
+      .on("ready", this.#describe)
+      .on("remove", () => this.remove());
     if (map.getViewState()) this.#describe({ target: map });
     this.#follow({ target: map });
   }
@@ -92,7 +111,8 @@ export class sync extends Evented<SyncEvents> {
     if (target !== leader || this.#abort.signal.aborted) return;
     const { clientWidth, clientHeight } = leader.container;
     void leader.pick([clientWidth / 2, clientHeight / 2]).then(({ position }) => {
-      if (!position || leader !== this.#leader || this.#abort.signal.aborted || Math.abs(position[2] - (this.#height ?? Infinity)) < SAME_M) return;
+      if (!position || leader !== this.#leader || this.#abort.signal.aborted || Math.abs(position[2] - (this.#height ?? Infinity)) < SAME_M)
+        return;
       this.#height = position[2];
       this.#follow({ target });
     });
@@ -126,6 +146,8 @@ function findDirection(each: map, leader: map, turn_deg: number): string | null 
   const from = leader.directions.find(({ id }) => id === leader.direction);
   if (!from) return null;
   const apart = (deg: number): number => Math.abs(((((deg - from.lookAtDeg - turn_deg) % 360) + 540) % 360) - 180);
-  const [nearest] = [...each.directions].sort((a, b) => Math.abs(a.pitchDeg - from.pitchDeg) - Math.abs(b.pitchDeg - from.pitchDeg) || apart(a.lookAtDeg) - apart(b.lookAtDeg));
+  const [nearest] = [...each.directions].sort(
+    (a, b) => Math.abs(a.pitchDeg - from.pitchDeg) - Math.abs(b.pitchDeg - from.pitchDeg) || apart(a.lookAtDeg) - apart(b.lookAtDeg),
+  );
   return nearest?.id ?? null;
 }

@@ -16,7 +16,11 @@ export class AccuracyCircle {
   }
 
   addTo(map: map, [x, y, z]: Vec3, radius_m: number): void {
-    const corners = Array.from({ length: CORNERS }, (_, k) => (2 * Math.PI * k) / CORNERS).map((angle): Vec3 => [x + radius_m * Math.cos(angle), y + radius_m * Math.sin(angle), z]);
+    const corners = Array.from({ length: CORNERS }, (_, k) => (2 * Math.PI * k) / CORNERS).map((angle): Vec3 => [
+      x + radius_m * Math.cos(angle),
+      y + radius_m * Math.sin(angle),
+      z,
+    ]);
     const update = (): void => {
       const points = corners.flatMap((point) => {
         const at = map.project(point);
@@ -27,7 +31,9 @@ export class AccuracyCircle {
     this.remove();
     map.overlayPane.prepend(this.#svg);
     map.frameEvents.on("move", update);
-    this.#stopFollowing = () => { map.frameEvents.off("move", update); };
+    this.#stopFollowing = () => {
+      map.frameEvents.off("move", update);
+    };
     update();
   }
 

@@ -9,7 +9,8 @@ const CORNERS: readonly string[] = ["topleft", "topright", "bottomleft", "bottom
 export const addToCorner: AddToCorner = (controlPane, control, corner) => {
   checkCorner(corner);
   adoptStyles(document, STYLES);
-  const box = controlPane.querySelector(`:scope > .map3d-${corner}`) ?? controlPane.appendChild(element("div", `map3d-corner map3d-${corner}`));
+  const box =
+    controlPane.querySelector(`:scope > .map3d-${corner}`) ?? controlPane.appendChild(element("div", `map3d-corner map3d-${corner}`));
   box.append(control);
 };
 

@@ -26,5 +26,8 @@ export async function findSurface(map: map, [x, y]: Vec2): Promise<Vec3> {
 /** Lowest and highest height of all layers. */
 function heightRange(map: map): [number, number] {
   const boxes = map.layers.flatMap(({ rendering }) => (rendering ? [rendering.json] : []));
-  return [Math.min(...boxes.map(({ origin, box }) => origin[2] + box[0][2])), Math.max(...boxes.map(({ origin, box }) => origin[2] + box[1][2]))];
+  return [
+    Math.min(...boxes.map(({ origin, box }) => origin[2] + box[0][2])),
+    Math.max(...boxes.map(({ origin, box }) => origin[2] + box[1][2])),
+  ];
 }

@@ -57,7 +57,9 @@ export class locate extends MapLayer<map, LocateEvents> {
     adoptStyles(document, STYLES);
     this.#button = iconButton("", messages.locate, TARGET);
     this.#button.setAttribute("aria-pressed", "false");
-    this.#button.addEventListener("click", () => { this.toggle(); });
+    this.#button.addEventListener("click", () => {
+      this.toggle();
+    });
     this.#box = addPanelButton(map, this.#button, this.#status);
   }
 
@@ -72,11 +74,16 @@ export class locate extends MapLayer<map, LocateEvents> {
     this.#say("");
     const request = ++this.#request;
     this.#button.ariaBusy = "true";
-    this.#locate().then((located) => request === this.#request && this.#show(located), (error: unknown) => {
-      if (request === this.#request) this.#fail(error as Error);
-    }).finally(() => {
-      if (request === this.#request) this.#button.ariaBusy = "false";
-    });
+    this.#locate()
+      .then(
+        (located) => request === this.#request && this.#show(located),
+        (error: unknown) => {
+          if (request === this.#request) this.#fail(error as Error);
+        },
+      )
+      .finally(() => {
+        if (request === this.#request) this.#button.ariaBusy = "false";
+      });
     return this;
   }
 
@@ -118,7 +125,9 @@ export class locate extends MapLayer<map, LocateEvents> {
 
   #fail(error: Error): void {
     this.#say(error.message);
-    this.#timer = setTimeout(() => { this.#say(""); }, MESSAGE_MS);
+    this.#timer = setTimeout(() => {
+      this.#say("");
+    }, MESSAGE_MS);
     this.fire("error", { error });
   }
 
@@ -131,9 +140,13 @@ export class locate extends MapLayer<map, LocateEvents> {
 /** Asks the browser for the location. @throws Map3dError with a message in the user's language */
 function queryPosition(messages: ControlMessages): Promise<GeolocationPosition> {
   return new Promise((resolve, reject) => {
-    navigator.geolocation.getCurrentPosition(resolve, ({ code, PERMISSION_DENIED }) => {
-      reject(new Map3dError(code === PERMISSION_DENIED ? messages.denied : messages.unavailable));
-    }, { enableHighAccuracy: true, timeout: TIMEOUT_MS, maximumAge: 0 });
+    navigator.geolocation.getCurrentPosition(
+      resolve,
+      ({ code, PERMISSION_DENIED }) => {
+        reject(new Map3dError(code === PERMISSION_DENIED ? messages.denied : messages.unavailable));
+      },
+      { enableHighAccuracy: true, timeout: TIMEOUT_MS, maximumAge: 0 },
+    );
   });
 }
 
@@ -143,7 +156,10 @@ function isOnMap(map: map, [x, y]: Vec2, [lon, lat]: Vec2): boolean {
   if (!roundTrip || Math.abs(roundTrip[0] - lon) > TOLERANCE_DEG || Math.abs(roundTrip[1] - lat) > TOLERANCE_DEG) return false;
   return map.layers.some(({ rendering }) => {
     if (!rendering) return false;
-    const { origin, box: [low, high] } = rendering.json;
+    const {
+      origin,
+      box: [low, high],
+    } = rendering.json;
     return [x, y].every((part, k) => part >= (origin[k] ?? 0) + (low[k] ?? 0) && part <= (origin[k] ?? 0) + (high[k] ?? 0));
   });
 }

@@ -43,7 +43,9 @@ export class overview extends MapLayer<map, object> {
     this.#pad.setAttribute("aria-label", messages.move);
     this.#pad.replaceChildren(this.#frame);
     this.#button = iconButton("", messages.overview, ICON);
-    this.#button.addEventListener("click", () => { this.toggle(); });
+    this.#button.addEventListener("click", () => {
+      this.toggle();
+    });
     this.#box = addPanelButton(map, this.#button, this.#pane);
     map.frameEvents.on("move", this.#placeFrame);
     map.on("directionchange", this.#fit);
@@ -81,12 +83,22 @@ export class overview extends MapLayer<map, object> {
     const shown = this.map;
     if (!shown?.getViewState() || this.#small || !this.open) return;
     const box = this.#pane.appendChild(element("div", ""));
-    const small = new map(box, { controls: false, attribution: false, direction: shown.direction, light: shown.light, cacheBytes: 16e6, workers: 1, ...(shown.drawer && { drawer: shown.drawer }) });
+    const small = new map(box, {
+      controls: false,
+      attribution: false,
+      direction: shown.direction,
+      light: shown.light,
+      cacheBytes: 16e6,
+      workers: 1,
+      ...(shown.drawer && { drawer: shown.drawer }),
+    });
     [box.inert, box.tabIndex] = [true, -1];
     this.#pane.append(this.#pad);
     this.#small = small;
     small.on("error", () => undefined); // the large map reports the same errors
-    small.on("ready", () => { this.#fit(); });
+    small.on("ready", () => {
+      this.#fit();
+    });
     small.frameEvents.on("move", this.#placeFrame);
     for (const layer of shown.layers) layer.copy().setStyle({}).clearHighlight().addTo(small);
   };
@@ -101,7 +113,10 @@ export class overview extends MapLayer<map, object> {
   readonly #fit = (): void => {
     const rendering = this.map?.layers.find((layer) => layer.rendering)?.rendering;
     if (!this.map || !rendering || !this.#small?.getViewState()) return;
-    const { origin, box: [low, high] } = rendering.json;
+    const {
+      origin,
+      box: [low, high],
+    } = rendering.json;
     const whole: Box3 = [add(origin, low), add(origin, high)];
     this.#small.setDirection(this.map.direction).fitBounds(whole, { padding_px: 6 });
     this.#placeFrame();
@@ -122,36 +137,62 @@ export class overview extends MapLayer<map, object> {
     const x = (shown.camera.u + dot(right, shift) - small.camera.u) / px_m + small.camera.width / 2;
     const y = (small.camera.v - shown.camera.v - dot(up, shift)) / px_m + small.camera.height / 2;
     const [width, height] = [shown.camera.width * scale, shown.camera.height * scale];
-    Object.assign(this.#frame.style, { width: `${width.toFixed(1)}px`, height: `${height.toFixed(1)}px`, transform: `translate(${(x - width / 2).toFixed(1)}px, ${(y - height / 2).toFixed(1)}px)` });
+    Object.assign(this.#frame.style, {
+      width: `${width.toFixed(1)}px`,
+      height: `${height.toFixed(1)}px`,
+      transform: `translate(${(x - width / 2).toFixed(1)}px, ${(y - height / 2).toFixed(1)}px)`,
+    });
   };
 
   #bindPointer(): void {
     const { signal } = this.#listeners;
     let drag: { at: Vec2; moved: boolean } | null = null;
-    this.#pad.addEventListener("pointerdown", ({ button, pointerId, target, clientX, clientY }) => {
-      if (button !== 0) return;
-      this.#pad.setPointerCapture(pointerId);
-      this.map?.startGesture();
-      drag = { at: [clientX, clientY], moved: target !== this.#frame };
-      if (drag.moved) this.#goTo(drag.at);
-    }, { signal });
-    this.#pad.addEventListener("pointermove", ({ clientX, clientY }) => {
-      if (!drag || (!drag.moved && Math.hypot(clientX - drag.at[0], clientY - drag.at[1]) < TAP_PX)) return;
-      this.#shift(clientX - drag.at[0], clientY - drag.at[1], false);
-      drag = { at: [clientX, clientY], moved: true };
-    }, { signal });
-    this.#pad.addEventListener("pointerup", () => {
-      if (drag && !drag.moved) this.#goTo(drag.at);
-      drag = null;
-    }, { signal });
-    this.#pad.addEventListener("pointercancel", () => { drag = null; }, { signal });
-    this.#pad.addEventListener("keydown", (event) => {
-      const step = KEYS[event.key];
-      if (!step || !this.map) return;
-      event.preventDefault();
-      const { clientWidth, clientHeight } = this.map.container;
-      this.map.panBy(step[0] * STEP * clientWidth, step[1] * STEP * clientHeight, { smooth: true });
-    }, { signal });
+    this.#pad.addEventListener(
+      "pointerdown",
+      ({ button, pointerId, target, clientX, clientY }) => {
+        if (button !== 0) return;
+        this.#pad.setPointerCapture(pointerId);
+        this.map?.startGesture();
+        drag = { at: [clientX, clientY], moved: target !== this.#frame };
+        if (drag.moved) this.#goTo(drag.at);
+      },
+      { signal },
+    );
+    this.#pad.addEventListener(
+      "pointermove",
+      ({ clientX, clientY }) => {
+        if (!drag || (!drag.moved && Math.hypot(clientX - drag.at[0], clientY - drag.at[1]) < TAP_PX)) return;
+        this.#shift(clientX - drag.at[0], clientY - drag.at[1], false);
+        drag = { at: [clientX, clientY], moved: true };
+      },
+      { signal },
+    );
+    this.#pad.addEventListener(
+      "pointerup",
+      () => {
+        if (drag && !drag.moved) this.#goTo(drag.at);
+        drag = null;
+      },
+      { signal },
+    );
+    this.#pad.addEventListener(
+      "pointercancel",
+      () => {
+        drag = null;
+      },
+      { signal },
+    );
+    this.#pad.addEventListener(
+      "keydown",
+      (event) => {
+        const step = KEYS[event.key];
+        if (!step || !this.map) return;
+        event.preventDefault();
+        const { clientWidth, clientHeight } = this.map.container;
+        this.map.panBy(step[0] * STEP * clientWidth, step[1] * STEP * clientHeight, { smooth: true });
+      },
+      { signal },
+    );
   }
 
   #goTo([x, y]: Vec2): void {

@@ -38,8 +38,18 @@ function check(ok: boolean, message = "the data tile is broken"): void {
 const unfold = (n: number): number => (n % 2 ? -(n + 1) : n) / 2;
 
 /** Columns of runs and labels; slopes and starts in units of depth; reads the next residual; tells whether everything was read. */
-type Columns = readonly [codes: Float64Array, lengths: Float64Array, ids: Float64Array, normals: Float64Array, shapes: Float64Array,
-  right: Float64Array, down: Float64Array, starts: Float64Array, residual: () => number, isDone: () => boolean];
+type Columns = readonly [
+  codes: Float64Array,
+  lengths: Float64Array,
+  ids: Float64Array,
+  normals: Float64Array,
+  shapes: Float64Array,
+  right: Float64Array,
+  down: Float64Array,
+  starts: Float64Array,
+  residual: () => number,
+  isDone: () => boolean,
+];
 
 /** Bytes beyond the end of a body read as NaN or 0; `isDone` is then false. */
 function readColumns(body: Uint8Array, runs: number, labels: number, residuals: number): Columns {
@@ -82,7 +92,13 @@ function readColumns(body: Uint8Array, runs: number, labels: number, residuals: 
   return [codes, lengths, ids, normals, shapes, right, down, starts, readResidual, () => read === residuals && at === body.length];
 }
 
-function paint(kind: DataKind, width: number, height: number, labels: number, [codes, lengths, ids, normals, shapes, right, down, starts, readResidual, isDone]: Columns): DataTile {
+function paint(
+  kind: DataKind,
+  width: number,
+  height: number,
+  labels: number,
+  [codes, lengths, ids, normals, shapes, right, down, starts, readResidual, isDone]: Columns,
+): DataTile {
   const values = kind === "normal" ? new Uint8Array(3 * width * height) : new Uint32Array(width * height);
   // By label: the plane's depth at (0, 0), and the offset of the first pixel of the last run.
   const [zeros, offsets] = [ids.slice(), new Int32Array(labels)];
@@ -91,7 +107,7 @@ function paint(kind: DataKind, width: number, height: number, labels: number, [c
   let [ends, owners]: [number[], number[]] = [[], []];
   for (let y = 0; y < height; y++) {
     const [rowEnds, rowOwners]: [number[], number[]] = [[], []];
-    for (let x = 0, j = 0; x < width; ) {
+    for (let x = 0, j = 0; x < width;) {
       const code = codes[run++] ?? 16;
       const from = y * width + x;
       while ((ends[j] as number) <= x) j++;
@@ -104,7 +120,7 @@ function paint(kind: DataKind, width: number, height: number, labels: number, [c
       const to = from + end - x;
       if (kind === "id") values.fill(ids[label] as number, from, to);
       else if (kind === "normal") {
-        for (let i = 3 * from; i < 3 * to; ) {
+        for (let i = 3 * from; i < 3 * to;) {
           values[i++] = color;
           values[i++] = color >> 8;
           values[i++] = color >> 16;

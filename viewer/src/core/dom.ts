@@ -1,7 +1,12 @@
 type Child = Node | string;
 
 /** Creates an element; strings among its children become text, never HTML. */
-export function element<K extends keyof HTMLElementTagNameMap>(tag: K, classes: string, attributes: Record<string, string> = {}, ...children: Child[]): HTMLElementTagNameMap[K] {
+export function element<K extends keyof HTMLElementTagNameMap>(
+  tag: K,
+  classes: string,
+  attributes: Record<string, string> = {},
+  ...children: Child[]
+): HTMLElementTagNameMap[K] {
   const created = document.createElement(tag);
   if (classes) created.className = classes;
   for (const [name, value] of Object.entries(attributes)) created.setAttribute(name, value);
@@ -19,7 +24,8 @@ export function iconButton(classes: string, label: string, path: string): HTMLBu
 export function icon(path: string): SVGSVGElement {
   const ns = "http://www.w3.org/2000/svg";
   const svg = document.createElementNS(ns, "svg");
-  for (const [name, value] of Object.entries({ viewBox: "0 0 24 24", "aria-hidden": "true", class: "map3d-icon" })) svg.setAttribute(name, value);
+  for (const [name, value] of Object.entries({ viewBox: "0 0 24 24", "aria-hidden": "true", class: "map3d-icon" }))
+    svg.setAttribute(name, value);
   const line = document.createElementNS(ns, "path");
   line.setAttribute("d", path);
   svg.append(line);

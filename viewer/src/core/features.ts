@@ -6,6 +6,7 @@ export const features: { [name: string]: unknown } = {};
 /** Returns what an entry adds. @param user what needs it  @throws UsageError when the entry is not loaded */
 export function getFeature(name: string, user: string): unknown {
   const feature = features[name];
-  if (feature === undefined) throw new UsageError(`${user} needs the entry ${name}: load map3d-${name}.js after map3d.js, or import "map3d/${name}"`);
+  if (feature === undefined)
+    throw new UsageError(`${user} needs the entry ${name}: load map3d-${name}.js after map3d.js, or import "map3d/${name}"`);
   return feature;
 }

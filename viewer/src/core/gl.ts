@@ -3,7 +3,10 @@ import { DrawError } from "./errors";
 /** Compiles and links a program. @param name for error messages  @throws DrawError with the compiler's log, or when the context is lost */
 export function linkProgram(gl: WebGL2RenderingContext, name: string, vertex: string, fragment: string): WebGLProgram {
   const program = gl.createProgram();
-  for (const [type, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]] as const) {
+  for (const [type, source] of [
+    [gl.VERTEX_SHADER, vertex],
+    [gl.FRAGMENT_SHADER, fragment],
+  ] as const) {
     const shader = gl.createShader(type);
     if (!shader) throw new DrawError("the WebGL context is lost");
     gl.shaderSource(shader, source);
@@ -18,7 +21,13 @@ export function linkProgram(gl: WebGL2RenderingContext, name: string, vertex: st
 }
 
 /** Creates an empty texture without mipmaps, clamped at its edges and bound to the active unit. @param format internal format, e.g. gl.RGBA8  @param width texels  @param height texels  @param filter minification and magnification */
-export function makeTexture(gl: WebGL2RenderingContext, format: number, width: number, height: number, filter: number = gl.NEAREST): WebGLTexture {
+export function makeTexture(
+  gl: WebGL2RenderingContext,
+  format: number,
+  width: number,
+  height: number,
+  filter: number = gl.NEAREST,
+): WebGLTexture {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
   for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, filter);

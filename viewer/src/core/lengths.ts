@@ -9,4 +9,5 @@ export function floorToRound(value: number): number {
 }
 
 /** Formats a round number of metres. */
-export const formatLength = (metres: number): string => metres >= 1000 ? `${String(metres / 1000)} km` : metres >= 1 ? `${String(metres)} m` : `${String(Math.round(metres * 100))} cm`;
+export const formatLength = (metres: number): string =>
+  metres >= 1000 ? `${String(metres / 1000)} km` : metres >= 1 ? `${String(metres)} m` : `${String(Math.round(metres * 100))} cm`;

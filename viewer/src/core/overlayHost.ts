@@ -32,4 +32,9 @@ export interface OverlayHost extends LayerHost<OverlayHost> {
 }
 
 /** Lets the user drag a positioned element: the entry `drag`. */
-export type EnableDragging = (handle: HTMLElement, map: OverlayHost, position: () => Vec3 | null, onDrag: (type: "dragstart" | "drag" | "dragend", position: Vec3) => void) => void;
+export type EnableDragging = (
+  handle: HTMLElement,
+  map: OverlayHost,
+  position: () => Vec3 | null,
+  onDrag: (type: "dragstart" | "drag" | "dragend", position: Vec3) => void,
+) => void;

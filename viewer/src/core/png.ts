@@ -41,11 +41,12 @@ export async function decodePng(bytes: Uint8Array<ArrayBuffer>): Promise<Decoded
 }
 
 function readChunks(bytes: Uint8Array<ArrayBuffer>): { header: PngHeader; parts: Uint8Array<ArrayBuffer>[] } {
-  if (!SIGNATURE.every((byte, k) => bytes[k] === byte)) throw new DecodeError(`not a PNG: ${String(bytes.length)} bytes without the PNG signature`);
+  if (!SIGNATURE.every((byte, k) => bytes[k] === byte))
+    throw new DecodeError(`not a PNG: ${String(bytes.length)} bytes without the PNG signature`);
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const parts: Uint8Array<ArrayBuffer>[] = [];
   let header: PngHeader | undefined;
-  for (let at = 8; at + 12 <= bytes.length; ) {
+  for (let at = 8; at + 12 <= bytes.length;) {
     const length = view.getUint32(at);
     const name = String.fromCharCode(...bytes.subarray(at + 4, at + 8));
     if (at + 12 + length > bytes.length) throw new DecodeError(`PNG is truncated in its ${name} chunk`);
@@ -64,7 +65,9 @@ function readHeader(view: DataView, at: number, length: number): PngHeader {
   const [depth, type, interlace] = [view.getUint8(at + 8), view.getUint8(at + 9), view.getUint8(at + 12)];
   const channels = CHANNELS[type];
   if (depth !== 8 || !channels || interlace !== 0) {
-    throw new DecodeError(`PNG of ${String(depth)} bits, colour type ${String(type)}, interlace ${String(interlace)}; expected 8 bits, colour type 0, 2, 4 or 6, interlace 0`);
+    throw new DecodeError(
+      `PNG of ${String(depth)} bits, colour type ${String(type)}, interlace ${String(interlace)}; expected 8 bits, colour type 0, 2, 4 or 6, interlace 0`,
+    );
   }
   if (width < 1 || height < 1 || width > SIDE_LIMIT || height > SIDE_LIMIT) {
     throw new DecodeError(`PNG of ${String(width)} × ${String(height)} pixels; expected 1 to ${String(SIDE_LIMIT)} on each side`);

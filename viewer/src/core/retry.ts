@@ -30,7 +30,10 @@ const MAX_WAIT_MS = 30_000;
  * @param run receives the number of failed attempts so far
  * @throws the error of the last attempt; the signal's reason when aborted during a wait
  */
-export async function retry<T>(run: (failed: number) => Promise<T | FailedAttempt>, { attempts = 4, backoff_ms = 250, signal }: RetryOptions = {}): Promise<T> {
+export async function retry<T>(
+  run: (failed: number) => Promise<T | FailedAttempt>,
+  { attempts = 4, backoff_ms = 250, signal }: RetryOptions = {},
+): Promise<T> {
   for (let failed = 0; ; failed++) {
     const result = await run(failed);
     if (!(result instanceof FailedAttempt)) return result;

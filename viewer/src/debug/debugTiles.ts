@@ -29,7 +29,11 @@ export class debugTiles extends MapLayer<map, object> {
   }
 }
 
-function outline({ view, layers, tiles }: Plan, { from, rect: [left, top, right, bottom], scale }: Plan["quads"][number], dpr: number): HTMLElement {
+function outline(
+  { view, layers, tiles }: Plan,
+  { from, rect: [left, top, right, bottom], scale }: Plan["quads"][number],
+  dpr: number,
+): HTMLElement {
   const now = performance.now();
   const lines = [...layers.values()].flatMap((layer) => {
     const sent = tiles.getTransfer(view, layer, from);

@@ -19,7 +19,12 @@ export const enableDragging: EnableDragging = (handle, map, position, onDrag) =>
     const at = start && map.project(start);
     if (drag || event.button !== 0 || !at) return;
     handle.setPointerCapture(event.pointerId);
-    drag = { id: event.pointerId, from: [event.clientX, event.clientY], offset: [at[0] - event.clientX, at[1] - event.clientY], moved: false };
+    drag = {
+      id: event.pointerId,
+      from: [event.clientX, event.clientY],
+      offset: [at[0] - event.clientX, at[1] - event.clientY],
+      moved: false,
+    };
   });
   handle.addEventListener("pointermove", (event) => {
     if (drag?.id !== event.pointerId) return;
@@ -35,9 +40,13 @@ export const enableDragging: EnableDragging = (handle, map, position, onDrag) =>
     if (drag.moved && end) {
       onDrag("dragend", end);
       // Suppresses the click that follows a drag.
-      const suppress = (click: Event): void => { click.stopImmediatePropagation(); };
+      const suppress = (click: Event): void => {
+        click.stopImmediatePropagation();
+      };
       handle.addEventListener("click", suppress, { capture: true, once: true });
-      setTimeout(() => { handle.removeEventListener("click", suppress, { capture: true }); });
+      setTimeout(() => {
+        handle.removeEventListener("click", suppress, { capture: true });
+      });
     }
     drag = undefined;
   };

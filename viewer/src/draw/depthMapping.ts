@@ -33,7 +33,8 @@ export function computeMaxStep({ frame, unit_m }: DepthMapping, level: number): 
 const MIN_BIAS_M = 0.05;
 
 /** Computes the depth bias of custom layers: a pixel above the deepest level has the minimum depth of those below it, on level ground up to half a pixel nearer than its centre. */
-export const computeCustomLayerBias = (frame: Frame, level: number): number => MIN_BIAS_M + 0.5 * (1 - 2 ** (level - frame.zmax)) * pixelM(frame, level) * computeRecession(frame);
+export const computeCustomLayerBias = (frame: Frame, level: number): number =>
+  MIN_BIAS_M + 0.5 * (1 - 2 ** (level - frame.zmax)) * pixelM(frame, level) * computeRecession(frame);
 
 /** Computes D of depth value 0, including the bias: D = first + value · unit_m. */
 export const computeDepthAtZero = ({ frame, shift, bias_m }: DepthMapping): number => frame.d0 + shift[2] - bias_m;

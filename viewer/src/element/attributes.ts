@@ -4,14 +4,16 @@ import { UsageError, type AnyPosition, type Light, type Mode, type Vec3 } from "
 export const PageElement = (globalThis as Partial<typeof globalThis>).HTMLElement ?? (class {} as typeof HTMLElement);
 
 /** Returns the words of an attribute, separated by white space; an empty list when it is missing. */
-export const words = (element: Element, name: string): string[] => (element.getAttribute(name) ?? "").split(/\s+/).filter((word) => word !== "");
+export const words = (element: Element, name: string): string[] =>
+  (element.getAttribute(name) ?? "").split(/\s+/).filter((word) => word !== "");
 
 /** Parses a position in the scene's CRS, metres. @throws UsageError */
-export const position = (element: Element, name: string): Vec3 | undefined => numbers(element, name, 3, "three numbers such as \"691000 5336000 520\"") as Vec3 | undefined;
+export const position = (element: Element, name: string): Vec3 | undefined =>
+  numbers(element, name, 3, 'three numbers such as "691000 5336000 520"') as Vec3 | undefined;
 
 /** Parses the place of an element: `lonlat` (degrees) on the ground, or coordinates of the scene's CRS. @param name attribute of the coordinates  @throws UsageError */
 export function place(element: Element, name: string): AnyPosition | undefined {
-  const lonLat = numbers(element, "lonlat", 2, "longitude and latitude in degrees, such as \"11.42 48.76\"") as [number, number] | undefined;
+  const lonLat = numbers(element, "lonlat", 2, 'longitude and latitude in degrees, such as "11.42 48.76"') as [number, number] | undefined;
   return lonLat ? { lonLat } : position(element, name);
 }
 
@@ -20,7 +22,7 @@ export const number = (element: Element, name: string): number | undefined => nu
 
 /** Parses "azimuth altitude", degrees. @throws UsageError */
 export function light(element: Element): Partial<Light> | undefined {
-  const [azimuth_deg, altitude_deg] = numbers(element, "light", 2, "azimuth and altitude in degrees, such as \"215 48\"") ?? [];
+  const [azimuth_deg, altitude_deg] = numbers(element, "light", 2, 'azimuth and altitude in degrees, such as "215 48"') ?? [];
   return azimuth_deg === undefined || altitude_deg === undefined ? undefined : { azimuth_deg, altitude_deg };
 }
 
@@ -29,7 +31,7 @@ export function time(element: Element): Date | undefined {
   const text = element.getAttribute("time")?.trim() ?? "";
   if (text === "") return undefined;
   const parsed = text === "now" ? new Date() : new Date(text);
-  if (Number.isNaN(parsed.getTime())) throw invalid(element, "time", "a time such as \"2026-06-21T14:00Z\", or \"now\"");
+  if (Number.isNaN(parsed.getTime())) throw invalid(element, "time", 'a time such as "2026-06-21T14:00Z", or "now"');
   return parsed;
 }
 
@@ -50,4 +52,5 @@ function numbers(element: Element, name: string, count: number, expected: string
   return values;
 }
 
-const invalid = (element: Element, name: string, expected: string): UsageError => new UsageError(`<${element.localName} ${name}="${element.getAttribute(name) ?? ""}">: ${name} must be ${expected}`);
+const invalid = (element: Element, name: string, expected: string): UsageError =>
+  new UsageError(`<${element.localName} ${name}="${element.getAttribute(name) ?? ""}">: ${name} must be ${expected}`);

@@ -1,11 +1,22 @@
+import { css } from "../core/css";
 import { element } from "../core/dom";
 import { findLanguage } from "../core/i18n";
 import { getElementMessages } from "./i18n";
 
-const STYLES = `
-:host { display: block; position: relative; height: 24rem; }
-:host([hidden]), slot[hidden] { display: none; }
-::slotted([slot="map"]) { position: absolute; inset: 0; }
+const STYLES = css`
+  :host {
+    display: block;
+    position: relative;
+    height: 24rem;
+  }
+  :host([hidden]),
+  slot[hidden] {
+    display: none;
+  }
+  ::slotted([slot="map"]) {
+    position: absolute;
+    inset: 0;
+  }
 `;
 
 /** Shows the map, or the fallback content of the element when no map can be drawn. Style sheets of the page apply to both. */

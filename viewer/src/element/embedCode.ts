@@ -12,10 +12,13 @@ export interface EmbedOptions {
 export function embedCode(map: map, { src, label }: EmbedOptions): string {
   const { center, light, time } = map;
   if (!center) throw new UsageError('embedCode: the map has no view yet; call it after "ready"');
-  if (typeof src !== "string" || src === "") throw new UsageError('embedCode: expected { src }, the folder of the rendering, such as "https://maps.example.org/town"');
+  if (typeof src !== "string" || src === "")
+    throw new UsageError('embedCode: expected { src }, the folder of the rendering, such as "https://maps.example.org/town"');
   const folder = src.replace(/\/+$/, "");
   const view = { direction: map.direction, center: center.map((part) => part.toFixed(1)).join(" "), zoom: map.zoom.toFixed(2) };
-  const sun = time ? { time: time.toISOString().replace(/:\d\d\.\d+Z$/, "Z") } : { light: `${light.azimuth_deg.toFixed(1)} ${light.altitude_deg.toFixed(1)}` };
+  const sun = time
+    ? { time: time.toISOString().replace(/:\d\d\.\d+Z$/, "Z") }
+    : { light: `${light.azimuth_deg.toFixed(1)} ${light.altitude_deg.toFixed(1)}` };
   const attributes = Object.entries({ src: folder, ...(label !== undefined && { label }), ...view, ...sun });
   const tag = `<map-3d${attributes.map(([name, value]) => ` ${name}="${escape(value)}"`).join("")}></map-3d>`;
   return [tag, ...["map3d.js", "map3d-element.js"].map((file) => `<script src="${escape(`${folder}/${file}`)}"></script>`), ""].join("\n");

@@ -10,7 +10,8 @@ export { embedCode, type EmbedOptions } from "./embedCode";
 const ELEMENTS = { "map-3d": mapElement, "map-3d-layer": layerElement, "map-3d-marker": markerElement };
 
 // Skipped without a DOM (server-side rendering). A second copy of this script keeps the elements of the first.
-if ("customElements" in globalThis) for (const [name, element] of Object.entries(ELEMENTS)) if (!customElements.get(name)) customElements.define(name, element);
+if ("customElements" in globalThis)
+  for (const [name, element] of Object.entries(ELEMENTS)) if (!customElements.get(name)) customElements.define(name, element);
 
 declare global {
   interface HTMLElementTagNameMap {

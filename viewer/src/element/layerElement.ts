@@ -31,9 +31,18 @@ export class layerElement extends part<imageLayer> {
 
 /** Creates the layer that an element's attributes describe. @throws UsageError */
 export function createLayer(element: Element): imageLayer {
-  const [urls, opacity, shown, attribution] = [words(element, "src"), number(element, "opacity"), mode(element), element.getAttribute("attribution")];
+  const [urls, opacity, shown, attribution] = [
+    words(element, "src"),
+    number(element, "opacity"),
+    mode(element),
+    element.getAttribute("attribution"),
+  ];
   if (urls.length === 0) throw new UsageError(`<${element.localName}> needs the attribute src, the base URL of a rendering`);
-  return new imageLayer(urls, { ...(shown !== undefined && { mode: shown }), ...(opacity !== undefined && { opacity }), ...(attribution !== null && { attribution }) });
+  return new imageLayer(urls, {
+    ...(shown !== undefined && { mode: shown }),
+    ...(opacity !== undefined && { opacity }),
+    ...(attribution !== null && { attribution }),
+  });
 }
 
 /** Applies a changed attribute to the layer. @returns false when the layer cannot change it  @throws UsageError */

@@ -1,4 +1,14 @@
-import { features, getFeature, map, type Addable, type AnyPosition, type imageLayer, type Light, type MapEvents, type MapOptions } from "../map3d";
+import {
+  features,
+  getFeature,
+  map,
+  type Addable,
+  type AnyPosition,
+  type imageLayer,
+  type Light,
+  type MapEvents,
+  type MapOptions,
+} from "../map3d";
 import { findFirstSun } from "../geo/firstSun";
 import { isOn, light, number, PageElement, place, time, words } from "./attributes";
 import { ElementContent } from "./elementContent";
@@ -100,7 +110,10 @@ export class mapElement extends PageElement implements ElementHost {
     if (name === "src") this.#srcChanged = true;
     if (!this.#map) this.#saved = { ...this.#saved, [name]: undefined, ...(name === "light" && { time: undefined }) };
     else if (RECREATING.has(name)) this.#scheduleRenew();
-    else if (this.#ready) this.#try(() => { this.#apply(name); });
+    else if (this.#ready)
+      this.#try(() => {
+        this.#apply(name);
+      });
     else this.#scheduleRenew();
   }
 
@@ -146,7 +159,13 @@ export class mapElement extends PageElement implements ElementHost {
   #addFeatures(): void {
     for (const name of FEATURES.filter((each) => isOn(this, each) && !this.#added.has(each))) {
       if (!(name in features) && document.readyState !== "complete") {
-        window.addEventListener("load", () => { this.#addFeatures(); }, { once: true });
+        window.addEventListener(
+          "load",
+          () => {
+            this.#addFeatures();
+          },
+          { once: true },
+        );
         return;
       }
       this.#try(() => this.#map?.add(new (getFeature(name, `<map-3d ${name}>`) as new () => Addable<map>)()));
@@ -157,7 +176,14 @@ export class mapElement extends PageElement implements ElementHost {
   #destroy(): void {
     const map = this.#map;
     if (!map) return;
-    if (this.#ready) this.#saved = { center: map.center ?? undefined, zoom: map.zoom, direction: map.direction, light: map.light, time: map.time ?? undefined };
+    if (this.#ready)
+      this.#saved = {
+        center: map.center ?? undefined,
+        zoom: map.zoom,
+        direction: map.direction,
+        light: map.light,
+        time: map.time ?? undefined,
+      };
     for (const each of this.#parts("map-3d-layer, map-3d-marker")) each.leave();
     map.remove();
     this.#content?.clear();
@@ -261,7 +287,10 @@ export class mapElement extends PageElement implements ElementHost {
     this.#ready = true;
     const { light: savedLight, time: savedTime } = this.#saved;
     if (savedTime) this.#try(() => this.#map?.setTime(savedTime));
-    else if (!savedLight) this.#try(() => { this.#startLight(); });
+    else if (!savedLight)
+      this.#try(() => {
+        this.#startLight();
+      });
     this.#saved = {};
     this.#updateContent();
   }

@@ -20,7 +20,10 @@ export class markerElement extends part<marker> {
   protected create(): marker {
     const [label, at, color] = [this.getAttribute("label")?.trim() ?? "", this.#place, this.getAttribute("color")];
     if (label === "") throw new UsageError("<map-3d-marker> needs the attribute label, its visible and accessible name");
-    if (!at) throw new UsageError(`<map-3d-marker label="${label}"> needs the attribute position: x, y and z in the scene's CRS, such as "691000 5336000 520"; or lonlat, such as "11.42 48.76"; or object, such as a gml:id`);
+    if (!at)
+      throw new UsageError(
+        `<map-3d-marker label="${label}"> needs the attribute position: x, y and z in the scene's CRS, such as "691000 5336000 520"; or lonlat, such as "11.42 48.76"; or object, such as a gml:id`,
+      );
     return new marker(label, at, color === null ? {} : { color });
   }
 
@@ -45,7 +48,9 @@ export class markerElement extends part<marker> {
 
   protected added(item: marker): void {
     this.#body ??= document.createElement("div");
-    this.#observer = new MutationObserver(() => { this.#moveContent(item); });
+    this.#observer = new MutationObserver(() => {
+      this.#moveContent(item);
+    });
     this.#observer.observe(this, { childList: true });
     this.#moveContent(item);
   }

@@ -65,7 +65,8 @@ export class dropFiles extends MapLayer<map, DropEvents> {
     const source = filesSource(files);
     await source.manifest();
     const map = this.map;
-    if (!map || request !== this.#request) throw new DOMException("other files were opened in the meantime, or the map was removed", "AbortError");
+    if (!map || request !== this.#request)
+      throw new DOMException("other files were opened in the meantime, or the map was removed", "AbortError");
     const [before, layer] = [this.#layer ?? this.options.instead, new imageLayer(source, this.options.layer)];
     before?.remove();
     if (map.layers.length === 0) map.resetView();
@@ -90,7 +91,9 @@ export class dropFiles extends MapLayer<map, DropEvents> {
     map.container.append(this.#over, this.#input);
     if (this.options.button ?? true) {
       const button = iconButton("", messages.open, FOLDER);
-      button.addEventListener("click", () => { this.#input.click(); });
+      button.addEventListener("click", () => {
+        this.#input.click();
+      });
       this.#box = addPanelButton(map, button, this.#status);
     }
     this.#listeners = new AbortController();
@@ -107,11 +110,17 @@ export class dropFiles extends MapLayer<map, DropEvents> {
   }
 
   #listen(target: HTMLElement, signal: AbortSignal): void {
-    const over = (active: boolean): void => { this.#over.toggleAttribute("data-over", active); };
+    const over = (active: boolean): void => {
+      this.#over.toggleAttribute("data-over", active);
+    };
     const listen = (type: "dragenter" | "dragover" | "drop", handle: (event: DragEvent) => void): void => {
-      target.addEventListener(type, (event) => {
-        if (event.dataTransfer?.types.includes("Files") === true) handle(event);
-      }, { signal });
+      target.addEventListener(
+        type,
+        (event) => {
+          if (event.dataTransfer?.types.includes("Files") === true) handle(event);
+        },
+        { signal },
+      );
     };
     for (const type of ["dragenter", "dragover"] as const) {
       listen(type, (event) => {
@@ -120,9 +129,13 @@ export class dropFiles extends MapLayer<map, DropEvents> {
         over(true);
       });
     }
-    target.addEventListener("dragleave", ({ relatedTarget }) => {
-      if (!target.contains(relatedTarget as Node | null)) over(false);
-    }, { signal });
+    target.addEventListener(
+      "dragleave",
+      ({ relatedTarget }) => {
+        if (!target.contains(relatedTarget as Node | null)) over(false);
+      },
+      { signal },
+    );
     listen("drop", (event) => {
       event.preventDefault();
       over(false);
@@ -143,7 +156,9 @@ export class dropFiles extends MapLayer<map, DropEvents> {
   #fail(error: Error): void {
     const messages = getFilesMessages(this.options.language ?? this.map?.language ?? "en");
     this.#say(error instanceof FilesError ? messages[error.problem](joinPaths(error.paths)) : `${messages.failed}: ${error.message}`);
-    this.#timer = setTimeout(() => { this.#say(""); }, MESSAGE_MS);
+    this.#timer = setTimeout(() => {
+      this.#say("");
+    }, MESSAGE_MS);
     this.fire("error", { error });
   }
 
@@ -156,14 +171,23 @@ export class dropFiles extends MapLayer<map, DropEvents> {
 /** Adds a layer to a map; settles when its manifest is read or rejected. */
 function addLayer(layer: imageLayer, map: map): Promise<void> {
   return new Promise((resolve, reject) => {
-    layer.once("ready", () => { resolve(); }).once("error", ({ error }) => { reject(error); });
+    layer
+      .once("ready", () => {
+        resolve();
+      })
+      .once("error", ({ error }) => {
+        reject(error);
+      });
     layer.addTo(map);
   });
 }
 
 function fitToLayer(map: map, { rendering }: imageLayer): void {
   if (!rendering) return;
-  const { origin, box: [low, high] } = rendering.json;
+  const {
+    origin,
+    box: [low, high],
+  } = rendering.json;
   map.fitBounds([add(origin, low), add(origin, high)]);
 }
 
@@ -174,7 +198,11 @@ function filesOf({ items, files }: DataTransfer): Promise<Iterable<File> | Folde
   return new DroppedEntries(entries).findFolders().then((folders) => {
     const [folder, ...more] = folders.values();
     if (!folder) throw new FilesError("none");
-    if (more.length > 0) throw new FilesError("several", [...folders.keys()].map((path) => path + MANIFEST));
+    if (more.length > 0)
+      throw new FilesError(
+        "several",
+        [...folders.keys()].map((path) => path + MANIFEST),
+      );
     return folder;
   });
 }

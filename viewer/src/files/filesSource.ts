@@ -18,7 +18,8 @@ export class FilesError extends Map3dError {
 const MAX_PATHS = 3;
 
 /** Joins the first few paths. */
-export const joinPaths = (paths: readonly string[]): string => paths.slice(0, MAX_PATHS).join(", ") + (paths.length > MAX_PATHS ? `, … (${String(paths.length)})` : "");
+export const joinPaths = (paths: readonly string[]): string =>
+  paths.slice(0, MAX_PATHS).join(", ") + (paths.length > MAX_PATHS ? `, … (${String(paths.length)})` : "");
 
 /** Largest accepted JSON file and archive part. Larger ones do not come from map3d. */
 const [MAX_JSON_BYTES, MAX_PART_BYTES] = [256 << 20, 64 << 20] as const;
@@ -32,7 +33,11 @@ export function filesSource(files: Iterable<File> | Folder): Source {
   const all = new Map(Array.from(files, (file) => [relativePath(file), file]));
   const [base, ...more] = findManifestFolders(all.keys());
   if (base === undefined) throw new FilesError("none");
-  if (more.length > 0) throw new FilesError("several", [base, ...more].map((path) => path + MANIFEST));
+  if (more.length > 0)
+    throw new FilesError(
+      "several",
+      [base, ...more].map((path) => path + MANIFEST),
+    );
   return new FilesSource(subfolder(all, base));
 }
 
@@ -54,11 +59,14 @@ class FilesSource implements Source {
   async json(path: string): Promise<unknown> {
     const file = await this.#file(path);
     if (!file) return null;
-    if (file.size > MAX_JSON_BYTES) throw new FetchError(`${path}: expected at most ${String(MAX_JSON_BYTES)} bytes, got ${String(file.size)}`);
+    if (file.size > MAX_JSON_BYTES)
+      throw new FetchError(`${path}: expected at most ${String(MAX_JSON_BYTES)} bytes, got ${String(file.size)}`);
     try {
       return JSON.parse(new TextDecoder().decode(await read(file, path))) as unknown;
     } catch (reason) {
-      throw reason instanceof SyntaxError ? new FetchError(`${path}: expected JSON, got ${String(file.size)} bytes of invalid JSON`) : reason;
+      throw reason instanceof SyntaxError
+        ? new FetchError(`${path}: expected JSON, got ${String(file.size)} bytes of invalid JSON`)
+        : reason;
     }
   }
 
@@ -92,7 +100,10 @@ class FilesSource implements Source {
       const whole = this.#files.get(path) ?? (await this.#requireFile(path));
       signal?.throwIfAborted();
       // Only the first part may reach beyond the end of a small archive.
-      if (offset > 0 && (length > MAX_PART_BYTES || offset + length > whole.size)) throw new FetchError(`${path}: expected ${String(length)} bytes at ${String(offset)}, but the file has ${String(whole.size)} bytes; copy the file again`);
+      if (offset > 0 && (length > MAX_PART_BYTES || offset + length > whole.size))
+        throw new FetchError(
+          `${path}: expected ${String(length)} bytes at ${String(offset)}, but the file has ${String(whole.size)} bytes; copy the file again`,
+        );
       return read(whole.slice(offset, offset + length), path);
     });
     this.#archives.set(path, archive);

@@ -24,7 +24,8 @@ export function subfolder(files: ReadonlyMap<string, Blob>, base: string): Folde
 }
 
 /** Is this the path of a file below the folder, with no way out of it? */
-export const isInside = (path: unknown): path is string => typeof path === "string" && path.split("/").every((part) => part !== "" && part !== "." && part !== ".." && !/[\\:\0]/.test(part));
+export const isInside = (path: unknown): path is string =>
+  typeof path === "string" && path.split("/").every((part) => part !== "" && part !== "." && part !== ".." && !/[\\:\0]/.test(part));
 
 /** Dropped files and folders, read on demand. */
 export class DroppedEntries {
@@ -59,7 +60,11 @@ export class DroppedEntries {
         const root = this.#roots.get(first);
         if (!root) return null;
         const entry = isDirectory(root) && rest.length > 0 ? await getFile(root, rest.join("/")) : root;
-        return entry?.isFile === true ? await new Promise<File>((resolve, reject) => { (entry as FileSystemFileEntry).file(resolve, reject); }) : null;
+        return entry?.isFile === true
+          ? await new Promise<File>((resolve, reject) => {
+              (entry as FileSystemFileEntry).file(resolve, reject);
+            })
+          : null;
       },
     };
   }
@@ -82,7 +87,9 @@ async function readEntries(directory: FileSystemDirectoryEntry): Promise<FileSys
   const reader = directory.createReader();
   const all: FileSystemEntry[] = [];
   for (;;) {
-    const batch = await new Promise<FileSystemEntry[]>((resolve, reject) => { reader.readEntries(resolve, reject); });
+    const batch = await new Promise<FileSystemEntry[]>((resolve, reject) => {
+      reader.readEntries(resolve, reject);
+    });
     if (batch.length === 0) return all;
     all.push(...batch);
   }

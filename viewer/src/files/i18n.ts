@@ -23,7 +23,8 @@ const DE: FilesMessages = {
   open: "Kartenordner öffnen",
   drop: "Kartenordner zum Öffnen hier ablegen",
   failed: "Die Karte konnte nicht geöffnet werden",
-  none: () => "Das ist kein Kartenordner: Die Datei rendering.json fehlt. Wählen Sie den vollständigen Ordner einer veröffentlichten Karte.",
+  none: () =>
+    "Das ist kein Kartenordner: Die Datei rendering.json fehlt. Wählen Sie den vollständigen Ordner einer veröffentlichten Karte.",
   several: (paths) => `Dieser Ordner enthält mehrere Karten: ${paths}. Wählen Sie den Ordner einer einzelnen Karte.`,
   missing: (paths) => `Dateien dieser Karte fehlen: ${paths}. Wählen Sie den vollständigen Ordner.`,
   changed: (paths) => `Die Datei ${paths} wurde geändert oder verschoben. Öffnen Sie den Ordner noch einmal.`,
@@ -33,7 +34,8 @@ const FR: FilesMessages = {
   open: "Ouvrir un dossier de carte",
   drop: "Déposez un dossier de carte ici pour l’ouvrir",
   failed: "Impossible d’ouvrir la carte",
-  none: () => "Ce n’est pas un dossier de carte\u00a0: le fichier rendering.json manque. Choisissez le dossier complet d’une carte publiée.",
+  none: () =>
+    "Ce n’est pas un dossier de carte\u00a0: le fichier rendering.json manque. Choisissez le dossier complet d’une carte publiée.",
   several: (paths) => `Ce dossier contient plusieurs cartes\u00a0: ${paths}. Choisissez le dossier d’une seule carte.`,
   missing: (paths) => `Des fichiers de cette carte manquent\u00a0: ${paths}. Choisissez le dossier complet.`,
   changed: (paths) => `Le fichier ${paths} a été modifié ou déplacé. Ouvrez de nouveau le dossier.`,

@@ -12,13 +12,16 @@ export function toCsv(objects: readonly (readonly [id: number, object: ObjectInf
   const names = [...new Set(objects.flatMap(([, { attributes }]) => Object.keys(attributes)))].sort();
   const rows = objects.map(([id, object]) => [id, object.name, object.class, ...names.map((name) => object.attributes[name] ?? null)]);
   // An attribute may have the name of a column that every object has.
-  return [[...FIXED, ...names.map((name) => (FIXED.some((fixed) => fixed === name) ? `attribute:${name}` : name))], ...rows].map((row) => `${row.map(toField).join(",")}\r\n`).join("");
+  return [[...FIXED, ...names.map((name) => (FIXED.some((fixed) => fixed === name) ? `attribute:${name}` : name))], ...rows]
+    .map((row) => `${row.map(toField).join(",")}\r\n`)
+    .join("");
 }
 
 /** Writes the objects in view as CSV, the largest first, or some objects of a layer, such as the selected ones. Fetches the ids in view and the attributes. */
 export async function exportCsv(map: map, { layer, ids }: CsvOptions = {}): Promise<string> {
   const first = layer ?? map.layers[0];
-  const wanted = ids && first ? ids.map((id) => ({ id, layer: first })) : (await map.objectsInView()).filter((seen) => !layer || seen.layer === layer);
+  const wanted =
+    ids && first ? ids.map((id) => ({ id, layer: first })) : (await map.objectsInView()).filter((seen) => !layer || seen.layer === layer);
   const found: [number, ObjectInfo][] = [];
   for (let k = 0; k < wanted.length; k += AT_ONCE) {
     const objects = await Promise.all(wanted.slice(k, k + AT_ONCE).map(async (one) => [one.id, await one.layer.object(one.id)] as const));

@@ -53,14 +53,16 @@ export class filter extends MapLayer<map, FilterEvents> {
 
   #apply(map: map): void {
     const expression = this.#expression;
-    findObjects(this.#layer, expression).then((ids) => {
-      if (this.map !== map || this.#expression !== expression) return;
-      this.#layer.setStyle({ only: ids, others: this.options.others, descendants: false }); // columns have inherited values
-      this.fire("change", { ids });
-    }).catch((reason: unknown) => {
-      if (this.map !== map) return;
-      this.fire("error", { error: asError(reason) });
-      map.report(asError(reason));
-    });
+    findObjects(this.#layer, expression)
+      .then((ids) => {
+        if (this.map !== map || this.#expression !== expression) return;
+        this.#layer.setStyle({ only: ids, others: this.options.others, descendants: false }); // columns have inherited values
+        this.fire("change", { ids });
+      })
+      .catch((reason: unknown) => {
+        if (this.map !== map) return;
+        this.fire("error", { error: asError(reason) });
+        map.report(asError(reason));
+      });
   }
 }

@@ -18,7 +18,9 @@ async function findAttributes(layer: imageLayer, names: ReadonlySet<string>): Pr
  */
 export async function findObjects(layer: imageLayer, expression: FilterExpression, ids?: readonly number[]): Promise<number[]> {
   const infos = await findAttributes(layer, checkExpression(expression));
-  const columns = new Map<string, ReadonlyMap<number, AttributeValue>>(await Promise.all(infos.map(async (info) => [info.name, await layer.column(info, ids)] as const)));
+  const columns = new Map<string, ReadonlyMap<number, AttributeValue>>(
+    await Promise.all(infos.map(async (info) => [info.name, await layer.column(info, ids)] as const)),
+  );
   const candidates = ids ?? new Set([...columns.values()].flatMap((column) => [...column.keys()]));
   return [...candidates].filter((id) => matches(expression, (name) => columns.get(name)?.get(id))).sort((a, b) => a - b);
 }

@@ -37,11 +37,7 @@ export function uvdFromLocal({ right, up, forward }: Axes, local: Vec3): Vec3 {
 }
 
 export function localFromUvd({ right, up, forward }: Axes, [u, v, d]: Vec3): Vec3 {
-  return [
-    u * right[0] + v * up[0] + d * forward[0],
-    u * right[1] + v * up[1] + d * forward[1],
-    u * right[2] + v * up[2] + d * forward[2],
-  ];
+  return [u * right[0] + v * up[0] + d * forward[0], u * right[1] + v * up[1] + d * forward[1], u * right[2] + v * up[2] + d * forward[2]];
 }
 
 /** Returns D of the point with this V and local height z; null when the view is level. */

@@ -48,4 +48,5 @@ function computeTerms(p: number, q: number, degree: number): number[] {
   return terms;
 }
 
-const sum = (factors: readonly number[], terms: readonly number[]): number => terms.reduce((all, term, k) => all + term * (factors[k] ?? 0), 0);
+const sum = (factors: readonly number[], terms: readonly number[]): number =>
+  terms.reduce((all, term, k) => all + term * (factors[k] ?? 0), 0);

@@ -23,7 +23,17 @@ export interface Light {
   occlusion: boolean;
 }
 
-export const DEFAULT_LIGHT: Readonly<Light> = { lit: true, azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.76, sun_rgb: [1, 1, 1], sky_rgb: [1, 1, 1], shadows: true, occlusion: true };
+export const DEFAULT_LIGHT: Readonly<Light> = {
+  lit: true,
+  azimuth_deg: 215,
+  altitude_deg: 48,
+  ambient: 0.42,
+  diffuse: 0.76,
+  sun_rgb: [1, 1, 1],
+  sky_rgb: [1, 1, 1],
+  shadows: true,
+  occlusion: true,
+};
 
 /** Unit vector towards the light, local axes. */
 export function towardsLight({ azimuth_deg, altitude_deg }: Pick<Light, "azimuth_deg" | "altitude_deg">): Vec3 {

@@ -66,9 +66,15 @@ export interface ManifestJson {
   content_version: number;
   /** Whether all tiles have been rendered. */
   complete: boolean;
-  crs: { epsg: number | null; wkt: string | null; name: string; vertical: string | null;
+  crs: {
+    epsg: number | null;
+    wkt: string | null;
+    name: string;
+    vertical: string | null;
     /** What heights refer to; absent in older manifests. */
-    heights?: "geoid" | "ellipsoid" | "unknown"; vertical_epsg?: number | null };
+    heights?: "geoid" | "ellipsoid" | "unknown";
+    vertical_epsg?: number | null;
+  };
   /** Position on earth; absent when unknown. */
   geographic?: GeographicJson;
   /** World coordinates of the local origin, metres. */
@@ -114,7 +120,12 @@ export const LIGHT_KINDS: readonly string[] = ["sun", "sun16", "ao"];
 export function readManifest(value: unknown, where: string): Rendering {
   const json = checkManifest(value, where);
   const views = new Map(json.views.map((view) => [view.id, makeView(view, json)]));
-  const layers = new Map(json.layers.flatMap((layer) => (layer.kind === "data" ? DATA_KINDS.map((kind) => ({ ...layer, kind })) : [layer])).reverse().map((layer) => [layer.kind, layer]));
+  const layers = new Map(
+    json.layers
+      .flatMap((layer) => (layer.kind === "data" ? DATA_KINDS.map((kind) => ({ ...layer, kind })) : [layer]))
+      .reverse()
+      .map((layer) => [layer.kind, layer]),
+  );
   return { json, views, layers };
 }
 
@@ -137,10 +148,17 @@ function checkManifest(value: unknown, where: string): ManifestJson {
   const fail = (why: string): never => {
     throw new ManifestError(`${where}: ${why}`);
   };
-  if (!json || typeof json !== "object" || json.map3d !== "rendering") return fail('is not a rendering.json: "map3d": "rendering" is missing');
-  if (json.version !== SUPPORTED_VERSION) return fail(`has version ${String(json.version)}, but this viewer reads version ${String(SUPPORTED_VERSION)}; use the viewer of the same release`);
+  if (!json || typeof json !== "object" || json.map3d !== "rendering")
+    return fail('is not a rendering.json: "map3d": "rendering" is missing');
+  if (json.version !== SUPPORTED_VERSION)
+    return fail(
+      `has version ${String(json.version)}, but this viewer reads version ${String(SUPPORTED_VERSION)}; use the viewer of the same release`,
+    );
   const wrong = FIELDS.find(([name, ok]) => !ok(json[name]));
-  if (wrong) return fail(`field "${wrong[0]}" is missing or malformed, got ${(JSON.stringify(json[wrong[0]]) as string | undefined ?? "nothing").slice(0, 80)}`);
+  if (wrong)
+    return fail(
+      `field "${wrong[0]}" is missing or malformed, got ${((JSON.stringify(json[wrong[0]]) as string | undefined) ?? "nothing").slice(0, 80)}`,
+    );
   const full = json as ManifestJson;
   const badView = full.views.find((view) => !isView(view));
   const badPasses = full.views.find((view) => !arePasses(view.passes));
@@ -174,14 +192,24 @@ function areSuns(value: unknown): boolean {
 }
 
 const isPair = (v: unknown): boolean => Array.isArray(v) && v.length === 2 && v.every(isNumber);
-const isTerms = (v: unknown, degree: number): boolean => Array.isArray(v) && v.length === (degree + 1) * (degree + 2) / 2 && v.every(isNumber);
+const isTerms = (v: unknown, degree: number): boolean =>
+  Array.isArray(v) && v.length === ((degree + 1) * (degree + 2)) / 2 && v.every(isNumber);
 
 function isGeographic(value: unknown): boolean {
   const geographic = value as Partial<GeographicJson> | undefined | null;
   if (geographic === undefined) return true;
-  if (!geographic || !isPair(geographic.local) || !isPair(geographic.lon_lat) || !(Number(geographic.unit_m) > 0) || !(Number(geographic.unit_deg) > 0)) return false;
+  if (
+    !geographic ||
+    !isPair(geographic.local) ||
+    !isPair(geographic.lon_lat) ||
+    !(Number(geographic.unit_m) > 0) ||
+    !(Number(geographic.unit_deg) > 0)
+  )
+    return false;
   const degree = Number(geographic.degree);
-  const rows = [geographic.to, geographic.back].flatMap((pair: readonly unknown[] | undefined) => (Array.isArray(pair) ? [pair[0], pair[1]] as unknown[] : [null]));
+  const rows = [geographic.to, geographic.back].flatMap((pair: readonly unknown[] | undefined) =>
+    Array.isArray(pair) ? ([pair[0], pair[1]] as unknown[]) : [null],
+  );
   return Number.isInteger(degree) && degree >= 1 && degree <= 16 && rows.every((row) => isTerms(row, degree));
 }
 

@@ -14,12 +14,17 @@ export type CoordinateTransform = (coordinate: Coordinate) => Vec3 | null;
 export function coordinateTransform(map: Pick<map, "lonLat" | "fromLonLat">, origin: Vec3, crs: "lonlat" | "scene"): CoordinateTransform {
   if (crs === "scene") return (coordinate) => ifNear(sub(coordinate, origin));
   const [middle, start] = [map.lonLat(origin), map.lonLat(origin) && map.fromLonLat(map.lonLat(origin) as Vec2)];
-  if (!middle || !start) throw new UsageError('this rendering has no geographic coordinates, so longitudes and latitudes cannot be placed; use coordinates of the scene with crs: "scene"');
+  if (!middle || !start)
+    throw new UsageError(
+      'this rendering has no geographic coordinates, so longitudes and latitudes cannot be placed; use coordinates of the scene with crs: "scene"',
+    );
   return ([lon, lat, z]) => {
     const [east, north] = [((((lon - middle[0] + 180) % 360) + 360) % 360) - 180, lat - middle[1]];
     const times = Math.max(Math.hypot(east, north) / REACH_DEG, 1);
     const at = map.fromLonLat([middle[0] + east / times, middle[1] + north / times]);
-    return at && ifNear([start[0] + (at[0] - start[0]) * times - origin[0], start[1] + (at[1] - start[1]) * times - origin[1], z - origin[2]]);
+    return (
+      at && ifNear([start[0] + (at[0] - start[0]) * times - origin[0], start[1] + (at[1] - start[1]) * times - origin[1], z - origin[2]])
+    );
   };
 }
 

@@ -28,21 +28,28 @@ export function drapedHeight(relief: Relief, x: number, y: number): number | nul
     const z = (at - v) / up[2];
     const above = relief.depthAt(u, at) - d - z * forward[2];
     if (Number.isNaN(above)) known = false;
-    else if (clear && above <= on && above >= -jump) return crosses(before, above, jump) ? zBefore + ((z - zBefore) * before) / (before - above) : refineContact(relief, { u, v, d }, j, above, jump);
+    else if (clear && above <= on && above >= -jump)
+      return crosses(before, above, jump)
+        ? zBefore + ((z - zBefore) * before) / (before - above)
+        : refineContact(relief, { u, v, d }, j, above, jump);
     else clear = above > on;
     [before, zBefore] = [above, z];
   }
   return known ? NaN : null;
 }
 
-const fromAbove = (depth: number, d: number, forward: number): number | null => (Number.isNaN(depth) ? null : Number.isFinite(depth) ? (depth - d) / forward : NaN);
+const fromAbove = (depth: number, d: number, forward: number): number | null =>
+  Number.isNaN(depth) ? null : Number.isFinite(depth) ? (depth - d) / forward : NaN;
 
 /** Does the point pass from above the surface to below it, without a jump? */
 const crosses = (before: number, above: number, jump: number): boolean => above <= 0 && before > 0 && before - above <= jump;
 
 /** Returns the height at which a point slightly above the surface, or on an edge, touches it. */
 function refineContact(relief: Relief, { u, v, d }: { u: number; v: number; d: number }, j: number, above: number, jump: number): number {
-  const { axes: { up, forward }, v0 } = relief.camera.frame;
+  const {
+    axes: { up, forward },
+    v0,
+  } = relief.camera.frame;
   const zAt = (row: number): number => (v0 - (row + 0.5) * relief.pixel_m - v) / up[2];
   const [here, below] = [zAt(j), zAt(j + 1)];
   if (above <= 0) return here;
@@ -57,7 +64,8 @@ export function fillHeights(points: Vec3[]): boolean {
     const z = points[k]?.[2] ?? NaN;
     if (Number.isNaN(z)) continue;
     const from = last < 0 ? z : (points[last]?.[2] ?? z);
-    for (let gap = last + 1; gap < k; gap++) points[gap] = withHeight(points[gap] as Vec3, last < 0 ? z : from + ((z - from) * (gap - last)) / (k - last));
+    for (let gap = last + 1; gap < k; gap++)
+      points[gap] = withHeight(points[gap] as Vec3, last < 0 ? z : from + ((z - from) * (gap - last)) / (k - last));
     last = k;
   }
   if (last < 0) return false;

@@ -19,7 +19,12 @@ export class FeatureList {
   readonly #onPress: (placed: PlacedFeature) => void;
   readonly #rows = new Map<PlacedFeature, { row: HTMLElement; button: HTMLButtonElement }>();
 
-  constructor(label: string, name: (placed: PlacedFeature) => string, focus: (placed: PlacedFeature | null) => void, press: (placed: PlacedFeature) => void) {
+  constructor(
+    label: string,
+    name: (placed: PlacedFeature) => string,
+    focus: (placed: PlacedFeature | null) => void,
+    press: (placed: PlacedFeature) => void,
+  ) {
     this.box.setAttribute("aria-label", label);
     [this.#nameOf, this.#onFocus, this.#onPress] = [name, focus, press];
   }
@@ -41,9 +46,15 @@ export class FeatureList {
 
   #add(placed: PlacedFeature): { row: HTMLElement; button: HTMLButtonElement } {
     const button = element("button", "", { type: "button" }, this.#nameOf(placed));
-    button.addEventListener("focus", () => { this.#onFocus(placed); });
-    button.addEventListener("blur", () => { this.#onFocus(null); });
-    button.addEventListener("click", () => { this.#onPress(placed); });
+    button.addEventListener("focus", () => {
+      this.#onFocus(placed);
+    });
+    button.addEventListener("blur", () => {
+      this.#onFocus(null);
+    });
+    button.addEventListener("click", () => {
+      this.#onPress(placed);
+    });
     const entry = { row: element("li", "", {}, button), button };
     this.#rows.set(placed, entry);
     this.box.append(entry.row);

@@ -86,7 +86,8 @@ export class FeatureRenderer {
 
   /** Lists the work required after a change. @returns the region to compute */
   #findWork(relief: Relief, view: UvRect): UvRect {
-    const current = this.#region && relief.level === this.#level && within(view, this.#region) && same(this.#sources, relief.sources(this.#region));
+    const current =
+      this.#region && relief.level === this.#level && within(view, this.#region) && same(this.#sources, relief.sources(this.#region));
     if (current && this.#region) return this.#region;
     const region = withMargin(view);
     [this.#region, this.#level, this.#sources] = [region, relief.level, relief.sources(region)];
@@ -125,7 +126,8 @@ export class FeatureRenderer {
     const scale = width / (view[1][0] - view[0][0]);
     const at = (u: number, v: number): Vec2 => [(u - view[0][0]) * scale, (view[1][1] - v) * scale];
     this.#drawTiles(context, relief, view, at);
-    for (const placed of this.#placed) for (const line of placed.lines) if (line.reach && overlaps(line.reach, view)) this.#drawLine(context, placed, line, at, dpr);
+    for (const placed of this.#placed)
+      for (const line of placed.lines) if (line.reach && overlaps(line.reach, view)) this.#drawLine(context, placed, line, at, dpr);
     for (const placed of this.#placed) this.#drawDots(context, placed, at, dpr);
   }
 
@@ -146,16 +148,29 @@ export class FeatureRenderer {
       context.beginPath();
       context.rect(...toScreen(rect));
       context.clip();
-      for (const other of this.#tiles.values()) if (other.image && other.level !== relief.level && overlaps(other.rect, rect)) context.drawImage(other.image, ...toScreen(other.rect));
+      for (const other of this.#tiles.values())
+        if (other.image && other.level !== relief.level && overlaps(other.rect, rect))
+          context.drawImage(other.image, ...toScreen(other.rect));
       context.restore();
     }
   }
 
-  #drawLine(context: CanvasRenderingContext2D, placed: PlacedFeature, { sections }: FeatureLine, at: (u: number, v: number) => Vec2, dpr: number): void {
+  #drawLine(
+    context: CanvasRenderingContext2D,
+    placed: PlacedFeature,
+    { sections }: FeatureLine,
+    at: (u: number, v: number) => Vec2,
+    dpr: number,
+  ): void {
     const { style } = placed;
     const width = (style.width + (placed === this.#focused ? 2 : 0)) * dpr;
     if (style.width === 0) return;
-    const [visible, hidden] = [false, true].map((behind) => pathOf(sections.filter((section) => section.hidden === behind), at)) as [Path2D, Path2D];
+    const [visible, hidden] = [false, true].map((behind) =>
+      pathOf(
+        sections.filter((section) => section.hidden === behind),
+        at,
+      ),
+    ) as [Path2D, Path2D];
     [context.lineJoin, context.lineCap, context.strokeStyle] = ["round", "round", style.color];
     if (this.occlusion !== "hide") {
       context.globalAlpha = style.opacity * (OPACITY_BEHIND[this.occlusion] + 0.2);
@@ -212,12 +227,18 @@ function pathOf(sections: readonly LineSection[], at: (u: number, v: number) => 
 export function screenRect({ camera, pixel_m, level }: Relief): UvRect {
   const px = (pixel_m * 2 ** level) / 2 ** camera.zoom;
   const [w, h] = [(camera.width / 2) * px, (camera.height / 2) * px];
-  return [[camera.u - w, camera.v - h], [camera.u + w, camera.v + h]];
+  return [
+    [camera.u - w, camera.v - h],
+    [camera.u + w, camera.v + h],
+  ];
 }
 
 function withMargin([low, high]: UvRect): UvRect {
   const [w, h] = [(high[0] - low[0]) * MARGIN, (high[1] - low[1]) * MARGIN];
-  return [[low[0] - w, low[1] - h], [high[0] + w, high[1] + h]];
+  return [
+    [low[0] - w, low[1] - h],
+    [high[0] + w, high[1] + h],
+  ];
 }
 
 /** Keys of the tiles that overlap a rectangle; the tile grid extends beyond the frame. */
@@ -225,7 +246,8 @@ function tilesIn({ camera: { frame }, pixel_m, level }: Relief, [low, high]: UvR
   const side = frame.tilePx * pixel_m;
   const keys: string[] = [];
   for (let y = Math.floor((frame.v0 - high[1]) / side); y < (frame.v0 - low[1]) / side; y++) {
-    for (let x = Math.floor((low[0] - frame.u0) / side); x < (high[0] - frame.u0) / side; x++) keys.push(`${String(level)}/${String(x)}/${String(y)}`);
+    for (let x = Math.floor((low[0] - frame.u0) / side); x < (high[0] - frame.u0) / side; x++)
+      keys.push(`${String(level)}/${String(x)}/${String(y)}`);
   }
   return keys;
 }
@@ -233,5 +255,8 @@ function tilesIn({ camera: { frame }, pixel_m, level }: Relief, [low, high]: UvR
 function rectOf({ camera: { frame }, pixel_m }: Relief, key: string): UvRect {
   const [, x = 0, y = 0] = key.split("/").map(Number);
   const side = frame.tilePx * pixel_m;
-  return [[frame.u0 + x * side, frame.v0 - (y + 1) * side], [frame.u0 + (x + 1) * side, frame.v0 - y * side]];
+  return [
+    [frame.u0 + x * side, frame.v0 - (y + 1) * side],
+    [frame.u0 + (x + 1) * side, frame.v0 - y * side],
+  ];
 }

@@ -19,7 +19,8 @@ export interface PolygonCover {
 }
 
 /** Returns null for a polygon that is seen edge-on. */
-export const coverOf = (polygon: Polygon, relief: Relief): PolygonCover | null => (polygon.draped ? drapedCover(polygon, relief) : planeCover(polygon, relief));
+export const coverOf = (polygon: Polygon, relief: Relief): PolygonCover | null =>
+  polygon.draped ? drapedCover(polygon, relief) : planeCover(polygon, relief);
 
 /** Offset of the surface along the line of sight, so that filling a building's outline fills its walls, too. */
 const BEHIND_M = 0.05;
@@ -28,7 +29,9 @@ const BEHIND_M = 0.05;
 function drapedCover({ rings }: Polygon, { camera, heights }: Relief): PolygonCover {
   const { right, up, forward } = camera.frame.axes;
   const area = new PolygonIndex(rings.map((ring) => ring.map(([x, y]): Vec2 => [x, y])));
-  const corners = [area.low, area.high].flatMap(([x]) => [area.low, area.high].flatMap(([, y]) => heights.map((z) => uvdFromLocal(camera.frame.axes, [x, y, z]))));
+  const corners = [area.low, area.high].flatMap(([x]) =>
+    [area.low, area.high].flatMap(([, y]) => heights.map((z) => uvdFromLocal(camera.frame.axes, [x, y, z]))),
+  );
   return {
     box: boxOf(corners),
     at: (u, v, depth) => {
@@ -66,7 +69,10 @@ function planeCover({ rings }: Polygon, relief: Relief): PolygonCover | null {
 export function boxOf(points: Iterable<readonly number[]>): UvRect {
   let [u0, v0, u1, v1] = [Infinity, Infinity, -Infinity, -Infinity];
   for (const [u = 0, v = 0] of points) [u0, v0, u1, v1] = [Math.min(u0, u), Math.min(v0, v), Math.max(u1, u), Math.max(v1, v)];
-  return [[u0, v0], [u1, v1]];
+  return [
+    [u0, v0],
+    [u1, v1],
+  ];
 }
 
 export const overlaps = ([a, b]: UvRect, [c, d]: UvRect): boolean => a[0] <= d[0] && c[0] <= b[0] && a[1] <= d[1] && c[1] <= b[1];
@@ -81,16 +87,28 @@ export interface PolygonFill {
 }
 
 /** Returns the straight (not premultiplied) RGBA of a square tile with its top left corner at U and V; null for an empty tile. */
-export function fillTile(relief: Relief, [left, top]: Vec2, side_px: number, fills: readonly PolygonFill[]): Uint8ClampedArray<ArrayBuffer> | null {
+export function fillTile(
+  relief: Relief,
+  [left, top]: Vec2,
+  side_px: number,
+  fills: readonly PolygonFill[],
+): Uint8ClampedArray<ArrayBuffer> | null {
   const px = relief.pixel_m;
-  const square: UvRect = [[left, top - side_px * px], [left + side_px * px, top]];
+  const square: UvRect = [
+    [left, top - side_px * px],
+    [left + side_px * px, top],
+  ];
   const inside = fills.filter(({ cover }) => overlaps(cover.box, square));
   if (inside.length === 0) return null;
   const [depths, rgba] = [new Float64Array(side_px ** 2), new Uint8ClampedArray(4 * side_px ** 2)];
-  for (let at = 0; at < depths.length; at++) depths[at] = relief.depthAt(left + ((at % side_px) + 0.5) * px, top - (Math.floor(at / side_px) + 0.5) * px);
+  for (let at = 0; at < depths.length; at++)
+    depths[at] = relief.depthAt(left + ((at % side_px) + 0.5) * px, top - (Math.floor(at / side_px) + 0.5) * px);
   for (const fill of inside) {
     const [low, high] = fill.cover.box;
-    const range = (from: number, to: number): Vec2 => [Math.max(0, Math.floor(from / px - 0.5)), Math.min(side_px, Math.ceil(to / px + 0.5))];
+    const range = (from: number, to: number): Vec2 => [
+      Math.max(0, Math.floor(from / px - 0.5)),
+      Math.min(side_px, Math.ceil(to / px + 0.5)),
+    ];
     const [i0, i1] = range(low[0] - left, high[0] - left);
     const [j0, j1] = range(top - high[1], top - low[1]);
     for (let j = j0; j < j1; j++) {

@@ -109,7 +109,8 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
     adoptStyles(document, STYLES);
     map.overlayPane.prepend(this.#renderer.canvas);
     map.frameEvents.on("draw", this.#draw);
-    if (this.options.interactive !== false) map.on("preclick", this.#onClick).on("mousemove", this.#onMouseMove).on("moveend", this.#updateList).on("idle", this.#updateList);
+    if (this.options.interactive !== false)
+      map.on("preclick", this.#onClick).on("mousemove", this.#onMouseMove).on("moveend", this.#updateList).on("idle", this.#updateList);
     const load = (this.#load = new AbortController());
     this.#start(map, load.signal).catch((reason: unknown) => {
       if (load.signal.aborted) return;
@@ -136,7 +137,12 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
     const data = typeof this.#data === "string" ? await fetchJson(this.#data, signal) : this.#data;
     const { crs = "lonlat", filter } = this.options;
     const { shapes, skipped } = readGeojson(data, crs === "lonlat");
-    if (!map.relief) await new Promise<void>((ready) => map.once("ready", () => { ready(); }));
+    if (!map.relief)
+      await new Promise<void>((ready) =>
+        map.once("ready", () => {
+          ready();
+        }),
+      );
     const { relief } = map;
     if (signal.aborted || !relief) return;
     this.#addFeatures(map, relief, filter ? shapes.filter(({ feature }) => filter(feature)) : shapes, crs);
@@ -155,8 +161,17 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
     const messages = getGeojsonMessages(map.language);
     const numbers = new Map(this.#placed.map((placed, k) => [placed, k + 1]));
     if (interactive !== false) {
-      const press = (placed: PlacedFeature): void => { this.#fire("click", placed, anchorOf(placed, map.relief ?? relief) ?? [0, 0]); };
-      this.#list = new FeatureList(messages.features, (placed) => name(placed.feature) || messages.feature(String(numbers.get(placed) ?? 0)), (placed) => { this.#focus(placed); }, press);
+      const press = (placed: PlacedFeature): void => {
+        this.#fire("click", placed, anchorOf(placed, map.relief ?? relief) ?? [0, 0]);
+      };
+      this.#list = new FeatureList(
+        messages.features,
+        (placed) => name(placed.feature) || messages.feature(String(numbers.get(placed) ?? 0)),
+        (placed) => {
+          this.#focus(placed);
+        },
+        press,
+      );
       map.overlayPane.append(this.#list.box);
     }
     if (onEachFeature) for (const { feature } of this.#placed) onEachFeature(feature);
@@ -220,10 +235,12 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
   readonly #updateList = (): void => {
     const relief = this.map?.relief;
     if (!relief) return;
-    this.#list?.show(this.#placed.flatMap((placed) => {
-      const at = anchorOf(placed, relief);
-      return at ? [{ placed, at }] : [];
-    }));
+    this.#list?.show(
+      this.#placed.flatMap((placed) => {
+        const at = anchorOf(placed, relief);
+        return at ? [{ placed, at }] : [];
+      }),
+    );
   };
 
   #clearHover(): void {
@@ -260,12 +277,17 @@ async function fetchJson(url: string, signal: AbortSignal): Promise<unknown> {
 }
 
 function nameOf({ id, properties }: Feature): string {
-  const name = [properties?.["name"], properties?.["title"], id].find((value): value is string | number => (typeof value === "string" && value.trim() !== "") || typeof value === "number");
+  const name = [properties?.["name"], properties?.["title"], id].find(
+    (value): value is string | number => (typeof value === "string" && value.trim() !== "") || typeof value === "number",
+  );
   return String(name ?? "").slice(0, 120);
 }
 
 function boundsOf(placed: readonly PlacedFeature[], { origin, heights }: Relief): Box3 | null {
-  const [low, high]: [number[], number[]] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
+  const [low, high]: [number[], number[]] = [
+    [Infinity, Infinity, Infinity],
+    [-Infinity, -Infinity, -Infinity],
+  ];
   const take = (position: readonly number[], draped: boolean): void => {
     for (const z of draped ? heights : [position[2] as number]) {
       [position[0] as number, position[1] as number, z].forEach((value, k) => {

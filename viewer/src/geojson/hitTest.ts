@@ -13,17 +13,26 @@ export function hitTest(placed: readonly PlacedFeature[], relief: Relief, [x, y]
   const at: Vec2 = [low[0] + x * px, high[1] - y * px];
   const last = (test: (feature: PlacedFeature) => boolean): PlacedFeature | undefined => placed.findLast(test);
   const onDot = ({ dots, style }: PlacedFeature): boolean =>
-    dots.some((dot) => dot.at && !(dot.hidden && occlusion === "hide") && Math.hypot(dot.at[0] - at[0], dot.at[1] - at[1]) <= (style.radius + TOLERANCE_PX) * px);
-  const onLine = ({ lines, style }: PlacedFeature): boolean => style.width > 0 && lines.some((line) => isNear(line, at, (style.width / 2 + TOLERANCE_PX) * px, occlusion));
-  const inside = ({ polygons, style }: PlacedFeature): boolean => style.fill !== null && polygons.some((polygon) => polygon.covers(relief, at, occlusion));
+    dots.some(
+      (dot) =>
+        dot.at &&
+        !(dot.hidden && occlusion === "hide") &&
+        Math.hypot(dot.at[0] - at[0], dot.at[1] - at[1]) <= (style.radius + TOLERANCE_PX) * px,
+    );
+  const onLine = ({ lines, style }: PlacedFeature): boolean =>
+    style.width > 0 && lines.some((line) => isNear(line, at, (style.width / 2 + TOLERANCE_PX) * px, occlusion));
+  const inside = ({ polygons, style }: PlacedFeature): boolean =>
+    style.fill !== null && polygons.some((polygon) => polygon.covers(relief, at, occlusion));
   return last(onDot) ?? last(onLine) ?? last(inside) ?? null;
 }
 
 function isNear({ sections, reach }: FeatureLine, [u, v]: Vec2, tolerance: number, occlusion: Occlusion): boolean {
-  if (!reach || u < reach[0][0] - tolerance || v < reach[0][1] - tolerance || u > reach[1][0] + tolerance || v > reach[1][1] + tolerance) return false;
+  if (!reach || u < reach[0][0] - tolerance || v < reach[0][1] - tolerance || u > reach[1][0] + tolerance || v > reach[1][1] + tolerance)
+    return false;
   return sections.some(({ uv, hidden }) => {
     if (hidden && occlusion === "hide") return false;
-    for (let k = 2; k < uv.length; k += 2) if (distance(u, v, uv[k - 2] as number, uv[k - 1] as number, uv[k] as number, uv[k + 1] as number) <= tolerance) return true;
+    for (let k = 2; k < uv.length; k += 2)
+      if (distance(u, v, uv[k - 2] as number, uv[k - 1] as number, uv[k] as number, uv[k + 1] as number) <= tolerance) return true;
     return false;
   });
 }
@@ -40,7 +49,9 @@ export function anchorOf({ dots, lines }: PlacedFeature, relief: Relief): Vec2 |
   const [low, high] = screenRect(relief);
   const px = (high[0] - low[0]) / relief.camera.width;
   const visible: Vec2[] = [];
-  const keep = (u: number, v: number): void => { if (u >= low[0] && v >= low[1] && u <= high[0] && v <= high[1]) visible.push([(u - low[0]) / px, (high[1] - v) / px]); };
+  const keep = (u: number, v: number): void => {
+    if (u >= low[0] && v >= low[1] && u <= high[0] && v <= high[1]) visible.push([(u - low[0]) / px, (high[1] - v) / px]);
+  };
   for (const { at, hidden } of dots) if (at && !hidden) keep(at[0], at[1]);
   for (const { reach, sections } of lines) {
     if (visible.length > 0 || !reach) break;

@@ -108,7 +108,10 @@ function append(uv: number[], u: number, v: number, bend: number): void {
 function drapedParts(points: readonly Vec3[], relief: Relief, [low, high]: UvRect): Vec3[][] {
   const { axes } = relief.camera.frame;
   const [lowest, highest] = relief.heights;
-  const reach: UvRect = [[low[0], low[1] - highest * axes.up[2]], [high[0], high[1] - lowest * axes.up[2]]];
+  const reach: UvRect = [
+    [low[0], low[1] - highest * axes.up[2]],
+    [high[0], high[1] - lowest * axes.up[2]],
+  ];
   const parts: Vec3[][] = [];
   let part: Vec3[] = [];
   const endPart = (): void => {

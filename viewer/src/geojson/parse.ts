@@ -38,7 +38,9 @@ interface GeometryCollector {
 /** Reads a FeatureCollection, Feature or geometry. Skips and counts invalid geometries. @param geographic coordinates are longitudes and latitudes  @throws UsageError when the data is not GeoJSON */
 export function readGeojson(data: unknown, geographic: boolean): { shapes: FeatureShape[]; skipped: Skipped } {
   const skipped = new Map<string, number>();
-  const skip = (reason: string): void => { skipped.set(reason, (skipped.get(reason) ?? 0) + 1); };
+  const skip = (reason: string): void => {
+    skipped.set(reason, (skipped.get(reason) ?? 0) + 1);
+  };
   const valid = geographic ? onEarth : (): boolean => true;
   const shapes = featuresOf(data, skip).flatMap((feature) => {
     const collector: GeometryCollector = { points: [], lines: [], polygons: [], skip, valid };
@@ -59,7 +61,8 @@ function featuresOf(data: unknown, skip: GeometryCollector["skip"]): Feature[] {
   if (GEOMETRIES.includes(type)) return [{ type: "Feature", geometry: data, properties: null }];
   if (type === "Feature") return [featureOf(data)];
   const features = data["features"];
-  if (type !== "FeatureCollection" || !Array.isArray(features)) throw new UsageError(`GeoJSON must be a FeatureCollection with features, a Feature or a geometry, got type "${type.slice(0, 40)}"`);
+  if (type !== "FeatureCollection" || !Array.isArray(features))
+    throw new UsageError(`GeoJSON must be a FeatureCollection with features, a Feature or a geometry, got type "${type.slice(0, 40)}"`);
   return features.flatMap((feature: unknown) => {
     if (isObject(feature) && feature["type"] === "Feature") return [featureOf(feature)];
     skip("not a feature");
@@ -68,7 +71,8 @@ function featuresOf(data: unknown, skip: GeometryCollector["skip"]): Feature[] {
 }
 
 /** Returns the feature as given; invalid properties become null. */
-const featureOf = (data: Record<string, unknown>): Feature => (isObject(data["properties"]) ? data : { ...data, properties: null }) as unknown as Feature;
+const featureOf = (data: Record<string, unknown>): Feature =>
+  (isObject(data["properties"]) ? data : { ...data, properties: null }) as unknown as Feature;
 
 function collect(geometry: unknown, collector: GeometryCollector, depth: number): void {
   const { type, coordinates, geometries } = isObject(geometry) ? geometry : {};
@@ -124,7 +128,8 @@ function polygonOf(value: unknown, collector: GeometryCollector): Coordinate[][]
   for (const part of value as unknown[]) {
     const ring = lineOf(part, collector, 3);
     const [first, last] = [ring?.[0], ring?.at(-1)];
-    if (ring && first && last && first[0] === last[0] && first[1] === last[1] && (first[2] === last[2] || Number.isNaN(first[2]))) ring.pop();
+    if (ring && first && last && first[0] === last[0] && first[1] === last[1] && (first[2] === last[2] || Number.isNaN(first[2])))
+      ring.pop();
     if (!ring || ring.length < 3) return null;
     rings.push(ring);
   }

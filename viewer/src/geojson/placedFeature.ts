@@ -26,7 +26,12 @@ export interface PlacedFeature {
 }
 
 /** Converts a feature to local coordinates; returns null when no part of it is near the scene. @param ground ignores given heights */
-export function placeFeature({ feature, points, lines, polygons }: FeatureShape, place: CoordinateTransform, ground: boolean, style: ResolvedStyle): PlacedFeature | null {
+export function placeFeature(
+  { feature, points, lines, polygons }: FeatureShape,
+  place: CoordinateTransform,
+  ground: boolean,
+  style: ResolvedStyle,
+): PlacedFeature | null {
   const local = (coordinates: FeatureShape["lines"][0]): Vec3[] | null => {
     const found = coordinates.map(place);
     return found.every((position) => position !== null) ? found : null;
@@ -46,7 +51,13 @@ export function placeFeature({ feature, points, lines, polygons }: FeatureShape,
     return position ? [new FeatureDot(position, isDraped([position]))] : [];
   });
   if (areas.length + ways.length + dots.length === 0) return null;
-  return { feature, style, lines: [...outlines, ...ways].map((path) => new FeatureLine(path)), polygons: areas.map((polygon) => new FeaturePolygon(polygon)), dots };
+  return {
+    feature,
+    style,
+    lines: [...outlines, ...ways].map((path) => new FeatureLine(path)),
+    polygons: areas.map((polygon) => new FeaturePolygon(polygon)),
+    dots,
+  };
 }
 
 /** Geometry computed from the surface and cached while the surface there does not change. */
@@ -72,7 +83,9 @@ abstract class CachedGeometry {
   isStale(relief: Relief, view: UvRect): boolean {
     const part = this.#part(relief, view);
     if (!part) return false;
-    return !this.#region || this.#level !== relief.level || !within(part, this.#region) || !same(this.#sources, relief.sources(this.#region));
+    return (
+      !this.#region || this.#level !== relief.level || !within(part, this.#region) || !same(this.#sources, relief.sources(this.#region))
+    );
   }
 
   /** Computes the part in a region. */
@@ -85,9 +98,18 @@ abstract class CachedGeometry {
 
   /** The part of the extent in a view, with a margin of some pixels, since the surface is sampled at pixels. */
   #part({ pixel_m }: Relief, view: UvRect): UvRect | null {
-    const [[u0, v0], [u1, v1]] = this.box ?? [[Infinity, Infinity], [-Infinity, -Infinity]];
+    const [[u0, v0], [u1, v1]] = this.box ?? [
+      [Infinity, Infinity],
+      [-Infinity, -Infinity],
+    ];
     const more = MARGIN_PX * pixel_m;
-    return intersection([[u0 - more, v0 - more], [u1 + more, v1 + more]], view);
+    return intersection(
+      [
+        [u0 - more, v0 - more],
+        [u1 + more, v1 + more],
+      ],
+      view,
+    );
   }
 
   protected abstract boxIn(relief: Relief): UvRect;
@@ -142,7 +164,10 @@ export class FeatureDot extends CachedGeometry {
 
   /** Updates the height from the surface. @returns false while the height is not known */
   updateHeight(relief: Relief): boolean {
-    const all: UvRect = [[-Infinity, -Infinity], [Infinity, Infinity]];
+    const all: UvRect = [
+      [-Infinity, -Infinity],
+      [Infinity, Infinity],
+    ];
     if (!this.box) this.setView(relief);
     if (this.isStale(relief, all)) this.update(relief, all, "none");
     return !Number.isNaN(this.#height);
@@ -192,9 +217,16 @@ function boxIn(points: readonly Vec3[], draped: boolean, { camera, heights }: Re
 }
 
 export function intersection(a: UvRect, b: UvRect): UvRect | null {
-  return overlaps(a, b) ? [[Math.max(a[0][0], b[0][0]), Math.max(a[0][1], b[0][1])], [Math.min(a[1][0], b[1][0]), Math.min(a[1][1], b[1][1])]] : null;
+  return overlaps(a, b)
+    ? [
+        [Math.max(a[0][0], b[0][0]), Math.max(a[0][1], b[0][1])],
+        [Math.min(a[1][0], b[1][0]), Math.min(a[1][1], b[1][1])],
+      ]
+    : null;
 }
 
-export const within = (a: UvRect, b: UvRect): boolean => a[0][0] >= b[0][0] && a[0][1] >= b[0][1] && a[1][0] <= b[1][0] && a[1][1] <= b[1][1];
+export const within = (a: UvRect, b: UvRect): boolean =>
+  a[0][0] >= b[0][0] && a[0][1] >= b[0][1] && a[1][0] <= b[1][0] && a[1][1] <= b[1][1];
 
-export const same = (a: readonly unknown[], b: readonly unknown[]): boolean => a.length === b.length && a.every((member, k) => member === b[k]);
+export const same = (a: readonly unknown[], b: readonly unknown[]): boolean =>
+  a.length === b.length && a.every((member, k) => member === b[k]);

@@ -18,7 +18,10 @@ export class PolygonIndex {
     for (const ring of rings) {
       for (const [x, y] of ring) [x0, y0, x1, y1] = [Math.min(x0, x), Math.min(y0, y), Math.max(x1, x), Math.max(y1, y)];
     }
-    [this.low, this.high] = [[x0, y0], [x1, y1]];
+    [this.low, this.high] = [
+      [x0, y0],
+      [x1, y1],
+    ];
     const edges = rings.reduce((sum, ring) => sum + ring.length, 0);
     const count = Math.max(1, Math.min(MAX_BANDS, Math.ceil(edges / EDGES_PER_BAND)));
     this.#bandHeight = (y1 - y0) / count || 1;

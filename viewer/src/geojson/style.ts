@@ -27,12 +27,38 @@ export interface ResolvedStyle extends Required<Omit<FeatureStyle, "fill">> {
 
 /** Fills in the defaults and parses the colours. @throws UsageError for invalid numbers and colours */
 export function resolveStyle(style: FeatureStyle, accent: string): ResolvedStyle {
-  const { color = accent, width = 3, opacity = 1, dash = [], halo = "rgba(255, 255, 255, 0.75)", fill = color, fillOpacity = 0.25, radius = 6 } = style;
-  const numbers: [string, number][] = [["width", width], ["opacity", opacity], ["fillOpacity", fillOpacity], ["radius", radius], ...dash.map((length): [string, number] => ["dash", length])];
-  for (const [name, value] of numbers) if (!(Number.isFinite(value) && value >= 0)) throw new UsageError(`a feature's ${name} must be a number of at least 0, got ${String(value).slice(0, 40)}`);
+  const {
+    color = accent,
+    width = 3,
+    opacity = 1,
+    dash = [],
+    halo = "rgba(255, 255, 255, 0.75)",
+    fill = color,
+    fillOpacity = 0.25,
+    radius = 6,
+  } = style;
+  const numbers: [string, number][] = [
+    ["width", width],
+    ["opacity", opacity],
+    ["fillOpacity", fillOpacity],
+    ["radius", radius],
+    ...dash.map((length): [string, number] => ["dash", length]),
+  ];
+  for (const [name, value] of numbers)
+    if (!(Number.isFinite(value) && value >= 0))
+      throw new UsageError(`a feature's ${name} must be a number of at least 0, got ${String(value).slice(0, 40)}`);
   if (halo !== null) rgbaOf(halo);
   const [r, g, b, a] = rgbaOf(fill ?? "#000");
-  return { color: colorOf(rgbaOf(color)), width, opacity: Math.min(opacity, 1), dash, halo, fill: fill === null || fillOpacity === 0 ? null : [r, g, b, a * Math.min(fillOpacity, 1)], fillOpacity, radius };
+  return {
+    color: colorOf(rgbaOf(color)),
+    width,
+    opacity: Math.min(opacity, 1),
+    dash,
+    halo,
+    fill: fill === null || fillOpacity === 0 ? null : [r, g, b, a * Math.min(fillOpacity, 1)],
+    fillOpacity,
+    radius,
+  };
 }
 
 const colorOf = ([r, g, b, a]: readonly number[]): string => `rgba(${String(r)}, ${String(g)}, ${String(b)}, ${String(a)})`;
@@ -64,6 +90,10 @@ function normalizeColor(color: string): string {
 
 function parseColor(color: string): Rgba | null {
   if (/^#[\da-f]{6}$/i.test(color)) return [1, 3, 5].map((k) => parseInt(color.slice(k, k + 2), 16)).concat(1) as Rgba;
-  const [r, g, b, a = 1] = /^rgba?\(([^)]*)\)$/.exec(color)?.[1]?.split(/[\s,/]+/).map(Number) ?? [];
+  const [r, g, b, a = 1] =
+    /^rgba?\(([^)]*)\)$/
+      .exec(color)?.[1]
+      ?.split(/[\s,/]+/)
+      .map(Number) ?? [];
   return r !== undefined && g !== undefined && b !== undefined && [r, g, b, a].every(Number.isFinite) ? [r, g, b, a] : null;
 }

@@ -3,7 +3,11 @@ import { properName, type Label } from "./label";
 
 /** A feature as far as labels read it. */
 export interface LabelledFeature {
-  readonly geometry?: { readonly type?: string; readonly coordinates?: unknown; readonly geometries?: readonly LabelledFeature["geometry"][] } | null;
+  readonly geometry?: {
+    readonly type?: string;
+    readonly coordinates?: unknown;
+    readonly geometries?: readonly LabelledFeature["geometry"][];
+  } | null;
   readonly properties?: Readonly<Record<string, unknown>> | null;
 }
 
@@ -13,7 +17,10 @@ type Transform = (lonLat: Vec2) => Vec2 | null;
 /** Makes a label of each feature that has a name: at a point, in the middle of a line, in the middle of a polygon. Larger features come first. @throws UsageError for anything but GeoJSON */
 export function labelFeatures(data: unknown, name: (feature: LabelledFeature) => string, toWorld: Transform): Label[] {
   const { type, features } = (data ?? {}) as { type?: string; features?: LabelledFeature[] };
-  if (type !== "FeatureCollection" || !Array.isArray(features)) throw new UsageError(`labels: expected an image layer, a URL or a FeatureCollection of GeoJSON, got ${type === undefined ? typeof data : `type "${type}"`}`);
+  if (type !== "FeatureCollection" || !Array.isArray(features))
+    throw new UsageError(
+      `labels: expected an image layer, a URL or a FeatureCollection of GeoJSON, got ${type === undefined ? typeof data : `type "${type}"`}`,
+    );
   return features.flatMap((feature) => {
     const text = name(feature);
     const place = text === "" ? null : findPlace(feature.geometry);
@@ -38,11 +45,17 @@ function findPlace(geometry: LabelledFeature["geometry"]): Place | null {
   const { type = "", coordinates } = geometry ?? {};
   const list = (Array.isArray(coordinates) ? coordinates : []) as unknown[];
   const parts = type.startsWith("Multi") ? list : [list];
-  const lines = parts.map((part) => (type.endsWith("Point") ? [part] : type.endsWith("Polygon") ? (part as unknown[])[0] : part) as Coordinate[]).filter((line) => Array.isArray(line) && line.length > 0 && line.every(isCoordinate));
+  const lines = parts
+    .map((part) => (type.endsWith("Point") ? [part] : type.endsWith("Polygon") ? (part as unknown[])[0] : part) as Coordinate[])
+    .filter((line) => Array.isArray(line) && line.length > 0 && line.every(isCoordinate));
   const largest = [...lines].sort((a, b) => extent(b) - extent(a))[0];
   if (!largest || !/(Point|LineString|Polygon)$/.test(type)) return null;
   const line = type.endsWith("LineString");
-  return { at: type.endsWith("Polygon") ? [centroid(largest)] : (line ? ALONG : [0]).map((share) => pointAt(largest, share)), size: extent(largest), line };
+  return {
+    at: type.endsWith("Polygon") ? [centroid(largest)] : (line ? ALONG : [0]).map((share) => pointAt(largest, share)),
+    size: extent(largest),
+    line,
+  };
 }
 
 const isCoordinate = (value: unknown): boolean => Array.isArray(value) && Number.isFinite(value[0]) && Number.isFinite(value[1]);

@@ -40,7 +40,12 @@ export class ObjectLabels {
     else {
       const [low, high] = box;
       const size = Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-      this.#known.set(root, { text, positions: [add(rendering.json.origin, [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2]])], rank: size, line: false });
+      this.#known.set(root, {
+        text,
+        positions: [add(rendering.json.origin, [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2]])],
+        rank: size,
+        line: false,
+      });
     }
   }
 }

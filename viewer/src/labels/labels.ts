@@ -132,19 +132,25 @@ export class labels extends MapLayer<map, LabelsEvents> {
       if (map.loaded()) this.#rest();
     } else if (this.#placed.size === 0) {
       map.whenReady(() => {
-        this.#run(map, async () => labelFeatures(typeof source === "string" ? await (await fetch(source)).json() : source, featureName, (lonLat) => map.fromLonLat(lonLat)));
+        this.#run(map, async () =>
+          labelFeatures(typeof source === "string" ? await (await fetch(source)).json() : source, featureName, (lonLat) =>
+            map.fromLonLat(lonLat),
+          ),
+        );
       });
     }
   }
 
   #run(map: map, read: () => Promise<readonly Label[]>): void {
-    read().then((list) => {
-      if (this.map === map) this.#add(list);
-    }).catch((reason: unknown) => {
-      if (this.map !== map) return;
-      this.fire("error", { error: asError(reason) });
-      map.report(asError(reason));
-    });
+    read()
+      .then((list) => {
+        if (this.map === map) this.#add(list);
+      })
+      .catch((reason: unknown) => {
+        if (this.map !== map) return;
+        this.fire("error", { error: asError(reason) });
+        map.report(asError(reason));
+      });
   }
 
   #add(list: readonly Label[]): void {
@@ -154,7 +160,13 @@ export class labels extends MapLayer<map, LabelsEvents> {
       if (this.#placed.has(key)) continue;
       const text = element("span", `map3d-label${label.line ? " map3d-label-line" : ""}`, {}, label.text);
       if (this.#pen) this.#pen.font = `600 13px ${font}`;
-      this.#placed.set(key, { label, element: text, width: this.#pen?.measureText(label.text).width ?? 8 * label.text.length, place: undefined, shown: false });
+      this.#placed.set(key, {
+        label,
+        element: text,
+        width: this.#pen?.measureText(label.text).width ?? 8 * label.text.length,
+        place: undefined,
+        shown: false,
+      });
     }
     this.#draw();
   }
@@ -198,7 +210,9 @@ export class labels extends MapLayer<map, LabelsEvents> {
     const others = [...(peers.get(map) ?? [])].flatMap((peer) => (peer === this ? [] : peer.#listBoxes(map)));
     const own = near.map(({ each, at }) => boxOf(each, at));
     const chosen = chooseLabels([...others, ...own]).slice(others.length);
-    near.forEach(({ each }, k) => { this.#show(each, chosen[k] === true); });
+    near.forEach(({ each }, k) => {
+      this.#show(each, chosen[k] === true);
+    });
     this.#move();
   }
 
@@ -215,7 +229,9 @@ export class labels extends MapLayer<map, LabelsEvents> {
   #findOnScreen(map: map, [x, y, z]: Vec3): Vec2 | null {
     const at = map.project(Number.isNaN(z) ? { xy: [x, y] } : [x, y, z]);
     const { clientWidth, clientHeight } = map.container;
-    return at && at[0] > -MARGIN_PX && at[1] > -MARGIN_PX && at[0] < clientWidth + MARGIN_PX && at[1] < clientHeight + MARGIN_PX ? at : null;
+    return at && at[0] > -MARGIN_PX && at[1] > -MARGIN_PX && at[0] < clientWidth + MARGIN_PX && at[1] < clientHeight + MARGIN_PX
+      ? at
+      : null;
   }
 
   #show(each: Placed, shown: boolean): void {

@@ -14,7 +14,9 @@ const GAP_PX = 4;
 
 /** Chooses labels that do not overlap: those that are shown first, then by rank. Returns whether each is chosen. */
 export function chooseLabels(boxes: readonly LabelBox[]): boolean[] {
-  const order = boxes.map((box, k) => ({ box, k })).sort((a, b) => Number(b.box.shown) - Number(a.box.shown) || b.box.rank - a.box.rank || a.k - b.k);
+  const order = boxes
+    .map((box, k) => ({ box, k }))
+    .sort((a, b) => Number(b.box.shown) - Number(a.box.shown) || b.box.rank - a.box.rank || a.k - b.k);
   const chosen: LabelBox[] = [];
   const result = boxes.map(() => false);
   for (const { box, k } of order) {

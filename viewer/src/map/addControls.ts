@@ -6,7 +6,10 @@ import { createScaleBar, type ScaledMap } from "../ui/scaleBar";
 import type { FilledOptions } from "./options";
 
 /** Adds the buttons, the scale bar and the attribution that the options ask for to a map. */
-export function addControls(map: ControlledMap & ScaledMap & AttributedMap & { readonly controlPane: HTMLElement }, options: FilledOptions): void {
+export function addControls(
+  map: ControlledMap & ScaledMap & AttributedMap & { readonly controlPane: HTMLElement },
+  options: FilledOptions,
+): void {
   const { controls, attribution, scaleBar = controls !== false } = options;
   const add = (control: HTMLElement, corner: Corner | true): void => {
     if (corner === true) map.controlPane.append(control);

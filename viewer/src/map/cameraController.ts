@@ -26,7 +26,12 @@ const ROTATION_STEP_RAD = (28 * Math.PI) / 180;
 /** The map's camera and everything that moves it. Calls before the first manifest has loaded wait for it. */
 export abstract class CameraController extends Evented<MapEvents> {
   abstract readonly options: FilledOptions;
-  protected readonly motion = new Motion(() => { this.requestFrame(); }, (camera) => this.#limit(camera));
+  protected readonly motion = new Motion(
+    () => {
+      this.requestFrame();
+    },
+    (camera) => this.#limit(camera),
+  );
   protected camera: Camera | undefined;
   /** The first layer's rendering, whose origin the camera uses. */
   protected reference: Rendering | undefined;
@@ -117,7 +122,9 @@ export abstract class CameraController extends Evented<MapEvents> {
   fitBounds(bounds: Bounds, { padding_px = 24, duration_ms = 0, maxZoom = Infinity }: FitOptions = {}): this {
     checkBounds(bounds, "fitBounds");
     for (const number of [padding_px, maxZoom]) checkNumber(number, "fitBounds");
-    return this.whenReady(() => { this.#switchView(); }).#moveTo((camera, rendering) => fitCamera(camera, localBox(bounds, rendering), padding_px, maxZoom), duration_ms);
+    return this.whenReady(() => {
+      this.#switchView();
+    }).#moveTo((camera, rendering) => fitCamera(camera, localBox(bounds, rendering), padding_px, maxZoom), duration_ms);
   }
 
   /** Sets the box that the map's centre stays in, by two opposite corners; null: the content's. */
@@ -133,7 +140,12 @@ export abstract class CameraController extends Evented<MapEvents> {
   zoomToRect([x0, y0]: Vec2, [x1, y1]: Vec2): void {
     this.#moveTo((camera) => {
       const [u, v] = uvFromScreen(camera, [(x0 + x1) / 2, (y0 + y1) / 2]);
-      return { ...camera, u, v, zoom: camera.zoom + Math.log2(Math.min(camera.width / Math.abs(x1 - x0), camera.height / Math.abs(y1 - y0))) };
+      return {
+        ...camera,
+        u,
+        v,
+        zoom: camera.zoom + Math.log2(Math.min(camera.width / Math.abs(x1 - x0), camera.height / Math.abs(y1 - y0))),
+      };
     }, FLIGHT_MS);
   }
 
@@ -208,7 +220,9 @@ export abstract class CameraController extends Evented<MapEvents> {
   /** Projects a position to CSS pixels; null before "ready". "ground" is the height of the content's lowest point. */
   project(position: Position): Vec2 | null {
     checkPosition(position, "project");
-    return this.camera && this.reference ? screenFromLocal(this.transitionCamera ?? this.camera, sub(worldPosition(position, this.reference), this.reference.json.origin)) : null;
+    return this.camera && this.reference
+      ? screenFromLocal(this.transitionCamera ?? this.camera, sub(worldPosition(position, this.reference), this.reference.json.origin))
+      : null;
   }
 
   /** Returns the world position under CSS pixels on the ground (the height of the content's lowest point); null in level views. */
@@ -290,7 +304,14 @@ export abstract class CameraController extends Evented<MapEvents> {
     const { pixelRatio, maxPixelRatio, maxTileRatio, finer, dataSaver } = this.options;
     const dpr = pixelRatio ?? Math.min(this.size.dpr, maxPixelRatio);
     const coarser = dataSaver && dpr >= 1.5 ? 1 : 0;
-    return this.camera && this.reference ? { camera: this.camera, origin: this.reference.json.origin, dpr, finer: finer - coarser + Math.min(0, Math.log2(maxTileRatio / dpr)) } : null;
+    return this.camera && this.reference
+      ? {
+          camera: this.camera,
+          origin: this.reference.json.origin,
+          dpr,
+          finer: finer - coarser + Math.min(0, Math.log2(maxTileRatio / dpr)),
+        }
+      : null;
   }
 
   /** @internal Sets the camera to another map's, with its origin, without limits. */
@@ -352,13 +373,20 @@ export abstract class CameraController extends Evented<MapEvents> {
     const { direction, center, zoom, minZoom, maxZoom, maxBounds } = this.options;
     const view = views.get(direction ?? "") ?? [...views.values()][0];
     if (!view) return;
-    if (direction !== undefined && !views.has(direction)) this.report(new UsageError(`unknown view "${direction}"; the rendering has ${[...views.keys()].join(", ")}`));
+    if (direction !== undefined && !views.has(direction))
+      this.report(new UsageError(`unknown view "${direction}"; the rendering has ${[...views.keys()].join(", ")}`));
     this.reference = rendering;
     this.#limits = { box: json.box, bounds: json.box, minZoom, maxZoom };
     this.setCamera(makeFirstCamera(rendering, view, this.size, this.options));
     this.#unsized = this.size.width * this.size.height > 0 ? undefined : this.camera;
-    if (maxBounds) this.#pending.unshift(() => { this.setMaxBounds(maxBounds); });
-    if (center && !isVector(center)) this.#pending.unshift(() => { this.setView(center, zoom); });
+    if (maxBounds)
+      this.#pending.unshift(() => {
+        this.setMaxBounds(maxBounds);
+      });
+    if (center && !isVector(center))
+      this.#pending.unshift(() => {
+        this.setView(center, zoom);
+      });
     for (const action of this.#pending.splice(0)) this.#runPending(action);
     this.fire("ready", {});
     this.fire("directionchange", { direction: this.direction });
@@ -401,11 +429,18 @@ export abstract class CameraController extends Evented<MapEvents> {
   #centerOn(position: AnyPosition, zoom: number | undefined, duration_ms: number): this {
     checkPosition(position, "setView");
     checkNumber(zoom, "zoom");
-    if (isVector(position)) return this.whenReady(() => { this.#switchView(); }).#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), duration_ms);
+    if (isVector(position))
+      return this.whenReady(() => {
+        this.#switchView();
+      }).#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), duration_ms);
     const move = ++this.#moves;
-    this.findPosition(position).then((found) => {
-      if (move === this.#moves) this.#centerOn(found, zoom, duration_ms);
-    }).catch((reason: unknown) => { this.report(asError(reason)); });
+    this.findPosition(position)
+      .then((found) => {
+        if (move === this.#moves) this.#centerOn(found, zoom, duration_ms);
+      })
+      .catch((reason: unknown) => {
+        this.report(asError(reason));
+      });
     return this;
   }
 
@@ -439,7 +474,9 @@ export abstract class CameraController extends Evented<MapEvents> {
     const { camera, reference } = this;
     if (!camera || !reference || this.options.dataSaver) return [];
     const views = [1, -1].map((step) => reference.views.get(findNeighbourView(reference, camera.frame, step)) as View);
-    return [...new Set(views)].filter(({ frame }) => frame !== camera.frame).map((view) => ({ ...viewState, finer: viewState.finer - COARSE_STEPS, camera: this.#turn(view, camera) }));
+    return [...new Set(views)]
+      .filter(({ frame }) => frame !== camera.frame)
+      .map((view) => ({ ...viewState, finer: viewState.finer - COARSE_STEPS, camera: this.#turn(view, camera) }));
   }
 
   /** Computes the camera of another view with the same place at the centre. */

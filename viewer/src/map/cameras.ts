@@ -43,7 +43,12 @@ export function fitCamera(camera: Camera, box: Box3, padding: number, maxZoom: n
 }
 
 /** Makes the camera of the first picture: about the option `center`, else the rendering's start, else of everything. */
-export function makeFirstCamera(rendering: Rendering, { frame }: Pick<View, "frame">, { width, height }: Pick<Size, "width" | "height">, { center, zoom, cover }: MapOptions): Camera {
+export function makeFirstCamera(
+  rendering: Rendering,
+  { frame }: Pick<View, "frame">,
+  { width, height }: Pick<Size, "width" | "height">,
+  { center, zoom, cover }: MapOptions,
+): Camera {
   const { json } = rendering;
   const whole = fitCamera({ frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
   const fitted = cover ? fillScreen(whole, rendering.views.get(frame.id) as View, json.box) : whole;

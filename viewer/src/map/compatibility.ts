@@ -10,7 +10,8 @@ export function findMatchingView(rendering: Rendering, { lookAtDeg, pitchDeg }: 
 export function findIncompatibility(first: Rendering, other: Rendering): string | null {
   const [a, b] = [first.json, other.json];
   if (!isSameCrs(a.crs, b.crs)) return `its CRS is "${formatCrs(b.crs)}", but the map's is "${formatCrs(a.crs)}"`;
-  if (a.crs.vertical && b.crs.vertical && a.crs.vertical !== b.crs.vertical) return `its heights are ${b.crs.vertical}, but the map's are ${a.crs.vertical}`;
+  if (a.crs.vertical && b.crs.vertical && a.crs.vertical !== b.crs.vertical)
+    return `its heights are ${b.crs.vertical}, but the map's are ${a.crs.vertical}`;
   if ([...first.views.values()].some(({ frame }) => findMatchingView(other, frame))) return null;
   return `it has none of the map's views: it has ${[...other.views.keys()].join(", ")}, the map has ${[...first.views.keys()].join(", ")}`;
 }

@@ -17,11 +17,17 @@ const MAX_STEP = 8;
  * Finds the world coordinates of a position: of an object, the top centre of its box; on the ground, the highest surface that some view shows there, the
  * current one first, else the content's lowest height. @throws UsageError when there is no such object, or the scene's position on earth is unknown
  */
-export async function findPosition(position: AnyPosition, layers: readonly imageLayer[], viewState: ViewState, rendering: Rendering): Promise<Vec3> {
+export async function findPosition(
+  position: AnyPosition,
+  layers: readonly imageLayer[],
+  viewState: ViewState,
+  rendering: Rendering,
+): Promise<Vec3> {
   if (isVector(position)) return position;
   if ("object" in position) return findTop(layers, position.object);
   const world = worldPosition(position, rendering);
-  const frames = typeof position.height === "number" ? [] : [viewState.camera.frame, ...[...rendering.views.values()].map(({ frame }) => frame)];
+  const frames =
+    typeof position.height === "number" ? [] : [viewState.camera.frame, ...[...rendering.views.values()].map(({ frame }) => frame)];
   for (const frame of frames) {
     const z = await findSurface(layers, { ...viewState, camera: { ...viewState.camera, frame } }, sub(world, viewState.origin));
     if (z !== null) return [world[0], world[1], viewState.origin[2] + z];
@@ -34,7 +40,15 @@ async function findSurface(layers: readonly imageLayer[], view: ViewState, [x, y
   const { axes } = view.camera.frame;
   const [lowest, highest] = new Relief(layers, view).heights;
   const [low, high] = [uvdFromLocal(axes, [x, y, lowest]), uvdFromLocal(axes, [x, y, highest])];
-  const { relief } = await Relief.fetch(layers, view, [[low[0] - 1, low[1] - 1], [high[0] + 1, high[1] + 1]], TILES);
+  const { relief } = await Relief.fetch(
+    layers,
+    view,
+    [
+      [low[0] - 1, low[1] - 1],
+      [high[0] + 1, high[1] + 1],
+    ],
+    TILES,
+  );
   const z = findHeight(relief, x, y);
   return Number.isNaN(z) ? null : z;
 }
@@ -50,7 +64,8 @@ export function findHeight(relief: Relief, x: number, y: number): number | null 
     const above = relief.depthAt(u, v) - d;
     known &&= !Number.isNaN(above);
     // From above the surface to below it in one step: the surface is here; or it jumps, since something in front hides the point.
-    if (above <= 0) return above > -MAX_STEP * step ? z + (before > above && before < Infinity ? (step * -above) / (before - above) : 0) : null;
+    if (above <= 0)
+      return above > -MAX_STEP * step ? z + (before > above && before < Infinity ? (step * -above) / (before - above) : 0) : null;
     before = above;
   }
   return known ? null : NaN;
@@ -61,10 +76,12 @@ async function findTop(layers: readonly imageLayer[], wanted: number | string): 
   for (const layer of layers) {
     const [id] = typeof wanted === "number" ? [wanted] : await layer.findByName(wanted);
     const box = (await layer.object(id ?? 0))?.box;
-    if (box && layer.rendering) return add(layer.rendering.json.origin, [(box[0][0] + box[1][0]) / 2, (box[0][1] + box[1][1]) / 2, box[1][2]]);
+    if (box && layer.rendering)
+      return add(layer.rendering.json.origin, [(box[0][0] + box[1][0]) / 2, (box[0][1] + box[1][1]) / 2, box[1][2]]);
   }
   throw new UsageError(noObject(wanted));
 }
 
 /** Says that there is no object of a name or id. */
-export const noObject = (wanted: number | string): string => `no object has the ${typeof wanted === "number" ? "id" : "name"} ${JSON.stringify(wanted)}; search finds objects by a part of their name`;
+export const noObject = (wanted: number | string): string =>
+  `no object has the ${typeof wanted === "number" ? "id" : "name"} ${JSON.stringify(wanted)}; search finds objects by a part of their name`;

@@ -121,8 +121,28 @@ export class FrameRenderer {
     const plans = planned.map(({ plan }) => plan);
     this.#queue.setRequests(listRequests([...(next ?? []), ...plans]), listRequests(input.ahead.flatMap((each) => this.plan(each, input))));
     const complete = !layers.some((layer) => layer.isLoading) && planned.every(({ plan }) => plan.complete);
-    if (transition && gl) transition({ gl, width, height, complete, getDepthRange: (frame) => computeSceneDepthRange(viewState, frame, layers, customLayers), drawView: (camera, range, framebuffer) => { this.#drawView({ ...viewState, camera, dpr: 1 }, input, customLayers, { range, framebuffer }); } });
-    else this.#drawer.draw({ camera: viewState.camera, width, height, dpr: viewState.dpr, light, customLayers, lighting: lightEstimator && { estimator: lightEstimator, moving }, passes: planned.map(({ layer, plan }) => layer.makePass(plan, viewState, before(layer))) });
+    if (transition && gl)
+      transition({
+        gl,
+        width,
+        height,
+        complete,
+        getDepthRange: (frame) => computeSceneDepthRange(viewState, frame, layers, customLayers),
+        drawView: (camera, range, framebuffer) => {
+          this.#drawView({ ...viewState, camera, dpr: 1 }, input, customLayers, { range, framebuffer });
+        },
+      });
+    else
+      this.#drawer.draw({
+        camera: viewState.camera,
+        width,
+        height,
+        dpr: viewState.dpr,
+        light,
+        customLayers,
+        lighting: lightEstimator && { estimator: lightEstimator, moving },
+        passes: planned.map(({ layer, plan }) => layer.makePass(plan, viewState, before(layer))),
+      });
     if (complete && gl && this.customLayers.size > 0 && !this.#showsCustomLayers) {
       this.#showsCustomLayers = true;
       this.#events.changed();
@@ -144,14 +164,31 @@ export class FrameRenderer {
   }
 
   /** Draws a view from the tiles in memory, with the depth of all layers that have any. */
-  #drawView(viewState: ViewState, { layers, light, lightEstimator }: FrameInput, customLayers: readonly CustomLayer[], target: NonNullable<FrameContent["target"]>): void {
+  #drawView(
+    viewState: ViewState,
+    { layers, light, lightEstimator }: FrameInput,
+    customLayers: readonly CustomLayer[],
+    target: NonNullable<FrameContent["target"]>,
+  ): void {
     const { camera } = viewState;
     const { width, height } = camera;
-    const passes = layers.filter((layer) => layer.isCombinable).flatMap((layer, k) => {
-      const plan = layer.plan(viewState, light, [], true);
-      return plan ? [layer.makePass(plan, viewState, k)] : [];
+    const passes = layers
+      .filter((layer) => layer.isCombinable)
+      .flatMap((layer, k) => {
+        const plan = layer.plan(viewState, light, [], true);
+        return plan ? [layer.makePass(plan, viewState, k)] : [];
+      });
+    this.#drawer.draw({
+      camera,
+      width,
+      height,
+      dpr: 1,
+      light,
+      customLayers,
+      lighting: lightEstimator && { estimator: lightEstimator, moving: false },
+      passes,
+      target,
     });
-    this.#drawer.draw({ camera, width, height, dpr: 1, light, customLayers, lighting: lightEstimator && { estimator: lightEstimator, moving: false }, passes, target });
   }
 
   /** Drops the tiles of a removed layer. */
@@ -171,10 +208,18 @@ export class FrameRenderer {
   #createDrawer(kind: FilledOptions["drawer"]): Drawer {
     const { canvas } = this.#viewport;
     const events: DrawerEvents = {
-      lost: () => { this.#onContextLost(); },
-      restored: () => { this.#onContextRestored(); },
-      changed: () => { this.#events.changed(); },
-      failed: (error) => { this.#events.failed(error); },
+      lost: () => {
+        this.#onContextLost();
+      },
+      restored: () => {
+        this.#onContextRestored();
+      },
+      changed: () => {
+        this.#events.changed();
+      },
+      failed: (error) => {
+        this.#events.failed(error);
+      },
     };
     const preserve = this.#options.preserveDrawingBuffer;
     if (kind === "canvas") return new CanvasDrawer(canvas, preserve, events);
@@ -189,7 +234,10 @@ export class FrameRenderer {
   }
 
   #onContextLost(): void {
-    if (this.#options.drawer === "auto") this.#restoreTimer ??= setTimeout(() => { this.#switchToCanvas(); }, RESTORE_MS);
+    if (this.#options.drawer === "auto")
+      this.#restoreTimer ??= setTimeout(() => {
+        this.#switchToCanvas();
+      }, RESTORE_MS);
     this.#events.lost();
   }
 

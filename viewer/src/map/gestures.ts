@@ -55,13 +55,55 @@ export class Gestures {
     this.#map = map;
     this.#canvas = canvas;
     const { signal } = this.#listeners;
-    canvas.addEventListener("pointerdown", (event) => { this.#down(event); }, { signal });
-    canvas.addEventListener("pointermove", (event) => { this.#move(event); }, { signal });
-    canvas.addEventListener("pointerup", (event) => { this.#up(event, true); }, { signal });
-    canvas.addEventListener("pointercancel", (event) => { this.#up(event, false); }, { signal });
-    canvas.addEventListener("pointerleave", () => { this.#map.hover(null); }, { signal });
-    canvas.addEventListener("contextmenu", (event) => { event.preventDefault(); }, { signal });
-    canvas.addEventListener("wheel", (event) => { this.#wheel(event); }, { signal, passive: false });
+    canvas.addEventListener(
+      "pointerdown",
+      (event) => {
+        this.#down(event);
+      },
+      { signal },
+    );
+    canvas.addEventListener(
+      "pointermove",
+      (event) => {
+        this.#move(event);
+      },
+      { signal },
+    );
+    canvas.addEventListener(
+      "pointerup",
+      (event) => {
+        this.#up(event, true);
+      },
+      { signal },
+    );
+    canvas.addEventListener(
+      "pointercancel",
+      (event) => {
+        this.#up(event, false);
+      },
+      { signal },
+    );
+    canvas.addEventListener(
+      "pointerleave",
+      () => {
+        this.#map.hover(null);
+      },
+      { signal },
+    );
+    canvas.addEventListener(
+      "contextmenu",
+      (event) => {
+        event.preventDefault();
+      },
+      { signal },
+    );
+    canvas.addEventListener(
+      "wheel",
+      (event) => {
+        this.#wheel(event);
+      },
+      { signal, passive: false },
+    );
   }
 
   destroy(): void {
@@ -124,7 +166,8 @@ export class Gestures {
     const startDistance = Math.hypot(pointer.at[0] - other.at[0], pointer.at[1] - other.at[1]);
     const distance = Math.hypot(at[0] - other.at[0], at[1] - other.at[1]);
     this.#map.panBy((at[0] - pointer.at[0]) / 2, (at[1] - pointer.at[1]) / 2);
-    if (startDistance > 0 && distance > 0) this.#map.pinch(distance / startDistance, [(at[0] + other.at[0]) / 2, (at[1] + other.at[1]) / 2]);
+    if (startDistance > 0 && distance > 0)
+      this.#map.pinch(distance / startDistance, [(at[0] + other.at[0]) / 2, (at[1] + other.at[1]) / 2]);
     this.#rotate(pointer.at, other.at, at);
   }
 
@@ -180,5 +223,10 @@ export class Gestures {
 }
 
 function drawBox({ style }: HTMLElement, [x0, y0]: Vec2, [x1, y1]: Vec2): void {
-  Object.assign(style, { left: `${String(Math.min(x0, x1))}px`, top: `${String(Math.min(y0, y1))}px`, width: `${String(Math.abs(x1 - x0))}px`, height: `${String(Math.abs(y1 - y0))}px` });
+  Object.assign(style, {
+    left: `${String(Math.min(x0, x1))}px`,
+    top: `${String(Math.min(y0, y1))}px`,
+    width: `${String(Math.abs(x1 - x0))}px`,
+    height: `${String(Math.abs(y1 - y0))}px`,
+  });
 }

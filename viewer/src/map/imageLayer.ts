@@ -88,7 +88,7 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
     checkNumber(options.opacity, "opacity");
     this.options = { mode: "lit", opacity: 1, highlightColor: "#19b5e0", combine: true, ...options };
     this.#mode = checkMode(this.options.mode);
-    this.source = typeof urls === "object" && "tile" in ((urls as object | null) ?? {}) ? urls as Source : new HttpSource(urls as string);
+    this.source = typeof urls === "object" && "tile" in ((urls as object | null) ?? {}) ? (urls as Source) : new HttpSource(urls as string);
   }
 
   /** @internal Makes a layer of the same rendering with the same styles, for another map. */
@@ -116,7 +116,8 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   /** Shows text beside the pointer while it is over an object; a function gets the object. Replaces the previous tooltip; null removes it. @throws UsageError without the entry `tooltip` */
   bindTooltip(content: TooltipContent | null): this {
     this.#unbindTooltip?.();
-    this.#unbindTooltip = content === null ? undefined : (getFeature("tooltip", "bindTooltip") as BindTooltip)(this, content, () => this.map?.overlayPane);
+    this.#unbindTooltip =
+      content === null ? undefined : (getFeature("tooltip", "bindTooltip") as BindTooltip)(this, content, () => this.map?.overlayPane);
     return this.#redraw();
   }
 
@@ -230,12 +231,14 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   async findByName(name: string): Promise<number[]> {
     const objects = this.#objects;
     const entries = (await objects?.search(name, MOST_NAMESAKES)) ?? [];
-    const found = await Promise.all(entries.map(async ([id, label]) => {
-      if (label === name) return [id];
-      const all = [id, ...((await objects?.descendants(id)) ?? [])];
-      const named = await Promise.all(all.map(async (each) => (await objects?.find(each))?.name === name));
-      return all.filter((_, k) => named[k]);
-    }));
+    const found = await Promise.all(
+      entries.map(async ([id, label]) => {
+        if (label === name) return [id];
+        const all = [id, ...((await objects?.descendants(id)) ?? [])];
+        const named = await Promise.all(all.map(async (each) => (await objects?.find(each))?.name === name));
+        return all.filter((_, k) => named[k]);
+      }),
+    );
     return found.flat();
   }
 
@@ -262,9 +265,14 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
       if (error) failed(error);
       context.requestFrame();
     });
-    this.source.manifest().then((rendering) => {
-      if (this.#context === context) this.#start(rendering, context);
-    }).catch((reason: unknown) => { failed(asError(reason)); });
+    this.source
+      .manifest()
+      .then((rendering) => {
+        if (this.#context === context) this.#start(rendering, context);
+      })
+      .catch((reason: unknown) => {
+        failed(asError(reason));
+      });
   }
 
   protected onRemove(): void {
@@ -313,7 +321,12 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
     const ids: LayerKind[] = this.#shownColors.size > 0 || this.#drawStyles ? ["id"] : [];
     const read = [...new Set([...ids, ...kinds])].filter((kind) => !needed.includes(kind));
     const extra = [...(light.lit ? listBakedLightKinds(mode, bakedLight) : []), ...read];
-    return planLayer(viewState, this.#rendering, view, this.#tiles, { bakedLight, layers: withShadowLayer(this.#rendering, bakedLight), needed, extra });
+    return planLayer(viewState, this.#rendering, view, this.#tiles, {
+      bakedLight,
+      layers: withShadowLayer(this.#rendering, bakedLight),
+      needed,
+      extra,
+    });
   }
 
   /** @internal Makes its pass of a frame. @param before number of combined layers added before it; null: it is not combined */
@@ -353,7 +366,9 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   /** Fetches the descendants of highlighted and styled objects, once, and shows them when they are known. */
   #findDescendants(): void {
     const [objects, known] = [this.#objects, this.#descendants];
-    const missing = [...new Set([...this.#colors.keys(), ...listStyledIds(this.#style)])].filter((id) => !known.has(id)).sort((a, b) => a - b);
+    const missing = [...new Set([...this.#colors.keys(), ...listStyledIds(this.#style)])]
+      .filter((id) => !known.has(id))
+      .sort((a, b) => a - b);
     if (!objects || missing.length === 0) return;
     for (const id of missing) known.set(id, []);
     const find = async (): Promise<void> => {
@@ -384,8 +399,13 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   #checkLayers(): void {
     const [rendering, context] = [this.#rendering, this.#context];
     if (!rendering || !context) return;
-    const missing = listRequiredKinds(this.#effectiveMode(rendering), this.#needsMask(rendering), false).filter((kind) => !rendering.layers.has(kind));
-    if (missing.length > 0) context.report(new UsageError(`mode "${this.#mode}" needs the layer ${missing.join(", ")}, which the rendering "${rendering.json.name}" lacks`));
+    const missing = listRequiredKinds(this.#effectiveMode(rendering), this.#needsMask(rendering), false).filter(
+      (kind) => !rendering.layers.has(kind),
+    );
+    if (missing.length > 0)
+      context.report(
+        new UsageError(`mode "${this.#mode}" needs the layer ${missing.join(", ")}, which the rendering "${rendering.json.name}" lacks`),
+      );
   }
 
   /** Without normals, "lit" falls back to "color". */

@@ -50,7 +50,13 @@ export interface LayerPlanInput {
   readonly extra: readonly LayerKind[];
 }
 
-export function planLayer(viewState: ViewState, rendering: Rendering, view: View, layerTiles: LayerTiles, { bakedLight, layers, needed, extra }: LayerPlanInput): LayerPlan {
+export function planLayer(
+  viewState: ViewState,
+  rendering: Rendering,
+  view: View,
+  layerTiles: LayerTiles,
+  { bakedLight, layers, needed, extra }: LayerPlanInput,
+): LayerPlan {
   const { frame, occupancy } = view;
   const { camera, dpr, finer } = viewState;
   const [u, v] = computeCenter(frame, viewState, rendering);
@@ -70,7 +76,18 @@ export function planLayer(viewState: ViewState, rendering: Rendering, view: View
     ...listRequests(layers, layerTiles, view, needed, ordered),
     ...listRequests(layers, layerTiles, view, extra, ordered),
   ];
-  return { view, bakedLight, layers, tiles: layerTiles, level, cover, quads, requests, complete: requests.length === 0, uncovered: fallbacks.filter(({ length }) => length === 0).length };
+  return {
+    view,
+    bakedLight,
+    layers,
+    tiles: layerTiles,
+    level,
+    cover,
+    quads,
+    requests,
+    complete: requests.length === 0,
+    uncovered: fallbacks.filter(({ length }) => length === 0).length,
+  };
 }
 
 /** Computes the minimum and maximum depth value of the rendering's box in a view. */
@@ -81,9 +98,19 @@ export function computeDepthRange(rendering: Rendering, { frame }: View): Vec2 {
 }
 
 /** Computes the minimum and maximum D, along a frame, of all layers and custom layers of a map. */
-export function computeSceneDepthRange({ origin }: ViewState, frame: Frame, layers: readonly { readonly rendering: Rendering | undefined }[], customLayers: readonly CustomLayer[]): Vec2 {
+export function computeSceneDepthRange(
+  { origin }: ViewState,
+  frame: Frame,
+  layers: readonly { readonly rendering: Rendering | undefined }[],
+  customLayers: readonly CustomLayer[],
+): Vec2 {
   const { axes } = frame;
-  const all = [...customLayers.flatMap((custom) => custom.getDepthRange(frame) ?? []), ...layers.flatMap(({ rendering }) => (rendering ? corners(rendering.json.box).map((corner) => dot(axes.forward, sub(add(rendering.json.origin, corner), origin))) : []))];
+  const all = [
+    ...customLayers.flatMap((custom) => custom.getDepthRange(frame) ?? []),
+    ...layers.flatMap(({ rendering }) =>
+      rendering ? corners(rendering.json.box).map((corner) => dot(axes.forward, sub(add(rendering.json.origin, corner), origin))) : [],
+    ),
+  ];
   return [Math.min(...all) - 1, Math.max(...all) + 1];
 }
 
@@ -111,12 +138,19 @@ function isInMemory(layers: LayerPlanInput["layers"], layerTiles: LayerTiles, vi
 }
 
 /** Lists requests for tiles that are neither in memory nor failed recently. */
-function listRequests(layers: LayerPlanInput["layers"], layerTiles: LayerTiles, view: View, kinds: readonly LayerKind[], tiles: readonly Tile[]): TileRequest[] {
+function listRequests(
+  layers: LayerPlanInput["layers"],
+  layerTiles: LayerTiles,
+  view: View,
+  kinds: readonly LayerKind[],
+  tiles: readonly Tile[],
+): TileRequest[] {
   const requests: TileRequest[] = [];
   for (const tile of tiles) {
     for (const kind of kinds) {
       const layer = layers.get(kind);
-      if (layer && !layerTiles.get(view, layer, tile) && !layerTiles.hasFailed(view, layer, tile)) requests.push(layerTiles.makeRequest(view, layer, tile));
+      if (layer && !layerTiles.get(view, layer, tile) && !layerTiles.hasFailed(view, layer, tile))
+        requests.push(layerTiles.makeRequest(view, layer, tile));
     }
   }
   return requests;

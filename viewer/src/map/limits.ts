@@ -66,7 +66,8 @@ export function fillScreen(camera: Camera, { frame, occupancy }: View, [low, hig
     const [u, v] = uvFromScreen(at, [((k % POINTS) * at.width) / (POINTS - 1), (Math.floor(k / POINTS) * at.height) / (POINTS - 1)]);
     // Tiles at the edge have content in a part of them only: the ground of the box ends there.
     const d = depthAtHeight(frame.axes, v, low[2]);
-    if (d !== null && localFromUvd(frame.axes, [u, v, d]).some((at, axis) => axis < 2 && (at < low[axis as 0] || at > high[axis as 0]))) return false;
+    if (d !== null && localFromUvd(frame.axes, [u, v, d]).some((at, axis) => axis < 2 && (at < low[axis as 0] || at > high[axis as 0])))
+      return false;
     const [x, y] = [Math.floor(((u - frame.u0) / frame.size) * count), Math.floor(((frame.v0 - v) / frame.size) * count)];
     return Math.min(x, y) >= 0 && Math.max(x, y) < count && occupancy.has({ z: frame.zmax, x, y });
   };

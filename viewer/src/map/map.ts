@@ -42,7 +42,9 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   readonly frameEvents = new Evented<OverlayEvents>();
   readonly #viewport: Viewport;
   readonly #renderer: FrameRenderer | null;
-  readonly #loop = new FrameLoop((now) => { this.#frame(now); });
+  readonly #loop = new FrameLoop((now) => {
+    this.#frame(now);
+  });
   readonly #items = new MapItems<map>((selected) => this.fire("select", { marker: selected }));
   readonly #light: MapLight;
   readonly #pointer = new PointerEvents(this);
@@ -71,13 +73,26 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     checkOptions(options, OPTIONS);
     if (options.center) checkPosition(options.center, "center");
     if (options.maxBounds) checkBounds(options.maxBounds, "maxBounds");
-    for (const name of ["zoom", "minZoom", "maxZoom", "pixelRatio", "maxPixelRatio", "maxTileRatio", "cacheBytes", "concurrency", "workers"] as const) checkNumber(options[name], name);
+    for (const name of [
+      "zoom",
+      "minZoom",
+      "maxZoom",
+      "pixelRatio",
+      "maxPixelRatio",
+      "maxTileRatio",
+      "cacheBytes",
+      "concurrency",
+      "workers",
+    ] as const)
+      checkNumber(options[name], name);
     const { dataSaver = DEFAULTS.dataSaver } = options;
     this.options = { ...DEFAULTS, ...options, dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
     const withoutShadows = this.options.dataSaver ? { shadows: false, occlusion: false } : {};
     this.#light = new MapLight({ ...withoutShadows, ...options.light });
     adoptStyles(document, STYLES);
-    this.#viewport = new Viewport(target, () => { this.#onResize(); });
+    this.#viewport = new Viewport(target, () => {
+      this.#onResize();
+    });
     if (options.background !== undefined) this.setBackground(options.background);
     this.#renderer = this.#createRenderer();
     this.#addListeners();
@@ -249,7 +264,11 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
    */
   async findPosition(position: AnyPosition): Promise<Vec3> {
     checkPosition(position, "findPosition");
-    const rendering = await new Promise<Rendering>((ready, fail) => { this.whenReady((_, found) => { ready(found); }).#items.onLoadError(fail); });
+    const rendering = await new Promise<Rendering>((ready, fail) => {
+      this.whenReady((_, found) => {
+        ready(found);
+      }).#items.onLoadError(fail);
+    });
     return findPosition(position, this.layers, this.getViewState() as ViewState, rendering);
   }
 
@@ -308,18 +327,28 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** @internal undefined when the map cannot draw. */
   get layerContext(): LayerContext | undefined {
     const renderer = this.#renderer;
-    return renderer === null ? undefined : {
-      tileResources: renderer.tileResources,
-      createName: () => `layer${String(this.#nameCount++)}`,
-      dropTiles: (layer) => { renderer.dropTiles(`${layer}/`); },
-      checkCompatible: (rendering) => { this.checkCompatible(rendering); },
-      onManifest: (rendering) => {
-        if (!this.camera) this.initializeView(rendering);
-        this.#redraw();
-      },
-      requestFrame: () => { this.#redraw(); },
-      report: (error) => { this.report(error); },
-    };
+    return renderer === null
+      ? undefined
+      : {
+          tileResources: renderer.tileResources,
+          createName: () => `layer${String(this.#nameCount++)}`,
+          dropTiles: (layer) => {
+            renderer.dropTiles(`${layer}/`);
+          },
+          checkCompatible: (rendering) => {
+            this.checkCompatible(rendering);
+          },
+          onManifest: (rendering) => {
+            if (!this.camera) this.initializeView(rendering);
+            this.#redraw();
+          },
+          requestFrame: () => {
+            this.#redraw();
+          },
+          report: (error) => {
+            this.report(error);
+          },
+        };
   }
 
   protected get size(): Size {
@@ -350,7 +379,8 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     this.advanceCamera(now);
     this.#pointer.flush();
     try {
-      if (this.#dirty || this.isTurning || this.camera !== this.#drawnCamera || wasInTransition || this.transitionCamera) this.#draw(wasInTransition || this.transitionCamera !== null);
+      if (this.#dirty || this.isTurning || this.camera !== this.#drawnCamera || wasInTransition || this.transitionCamera)
+        this.#draw(wasInTransition || this.transitionCamera !== null);
       else this.#comeToRest();
     } catch (reason) {
       this.report(asError(reason));
@@ -365,8 +395,21 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
     [this.#drawnCamera, this.#dirty, this.#relief] = [viewState.camera, false, undefined];
     const moving = lastCamera !== undefined && lastCamera !== viewState.camera;
     this.#fetchesAhead &&= !moving;
-    const input = { ...this.#planInput, lightEstimator: this.lightEstimator, moving, next: this.nextCamera && { ...viewState, camera: this.nextCamera }, ahead: this.#fetchesAhead ? this.listViewsAhead(viewState) : [] };
-    const { plans, complete, next } = this.#renderer.render(viewState, input, this.transitionCamera && ((scene) => { this.transition?.draw({ ...scene, camera: viewState.camera, tilesChanged }); }));
+    const input = {
+      ...this.#planInput,
+      lightEstimator: this.lightEstimator,
+      moving,
+      next: this.nextCamera && { ...viewState, camera: this.nextCamera },
+      ahead: this.#fetchesAhead ? this.listViewsAhead(viewState) : [],
+    };
+    const { plans, complete, next } = this.#renderer.render(
+      viewState,
+      input,
+      this.transitionCamera &&
+        ((scene) => {
+          this.transition?.draw({ ...scene, camera: viewState.camera, tilesChanged });
+        }),
+    );
     [this.#plans, this.#complete] = [plans, complete];
     if (lastCamera !== viewState.camera || inTransition) this.#fireMove(lastCamera, viewState.camera);
     this.frameEvents.fire("draw", {});
@@ -382,7 +425,10 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
 
   protected isCovered(camera: Camera): boolean {
     const viewState = this.getViewState();
-    return viewState !== null && this.#renderer?.plan({ ...viewState, camera }, this.#planInput).every(({ uncovered }) => uncovered === 0) === true;
+    return (
+      viewState !== null &&
+      this.#renderer?.plan({ ...viewState, camera }, this.#planInput).every(({ uncovered }) => uncovered === 0) === true
+    );
   }
 
   /** Lists kinds of tiles that are read, in addition to those shown. */
@@ -446,12 +492,16 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
           this.fire("contextrestored", {}).#redraw();
         },
         changed: () => this.#redraw(),
-        failed: (error) => { this.report(error); },
+        failed: (error) => {
+          this.report(error);
+        },
       });
     } catch (reason) {
       const error = asError(reason);
       this.container.append(element("p", "map3d-message", { role: "alert" }, error.message));
-      queueMicrotask(() => { this.report(error); });
+      queueMicrotask(() => {
+        this.report(error);
+      });
       return null;
     }
   }
@@ -459,9 +509,17 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   #addListeners(): void {
     const { signal } = this.#abort;
     this.#listenToGestures();
-    signal.addEventListener("abort", () => { this.#gestures?.destroy(); });
+    signal.addEventListener("abort", () => {
+      this.#gestures?.destroy();
+    });
     listenToKeys(this, signal);
-    window.addEventListener("online", () => { this.#retryFailedTiles(); }, { signal });
+    window.addEventListener(
+      "online",
+      () => {
+        this.#retryFailedTiles();
+      },
+      { signal },
+    );
   }
 
   /** Listens to gestures on the current canvas. */

@@ -22,7 +22,8 @@ export class MapLight {
 
   /** Sets the light to a time at a rendering's position. @throws UsageError when its position on earth is unknown */
   setTime(time: Date, { json }: Rendering): void {
-    if (!json.geographic) throw new UsageError(`cannot locate rendering "${json.name}" on earth, so the sun's position is unknown; use setLight instead`);
+    if (!json.geographic)
+      throw new UsageError(`cannot locate rendering "${json.name}" on earth, so the sun's position is unknown; use setLight instead`);
     this.time = time;
     this.#update(computeDaylight(time, json.geographic));
   }

@@ -11,8 +11,12 @@ export function findNeighbourView(rendering: Rendering, frame: Frame, step: numb
 
 /** Finds the view of the next pitch, +1 steeper, with the nearest look-at angle; null when there is no further pitch. */
 export function findTiltedView(rendering: Rendering, frame: Frame, step: number): string | null {
-  const candidates = [...rendering.views.values()].map((view) => view.frame).filter(({ pitchDeg }) => Math.sign(pitchDeg - frame.pitchDeg) === Math.sign(step));
-  const angle = ({ lookAtDeg }: Frame): number => Math.abs((((lookAtDeg - frame.lookAtDeg + 180) % 360) + 360) % 360 - 180);
-  const [best] = candidates.sort((a, b) => Math.abs(a.pitchDeg - frame.pitchDeg) - Math.abs(b.pitchDeg - frame.pitchDeg) || angle(a) - angle(b));
+  const candidates = [...rendering.views.values()]
+    .map((view) => view.frame)
+    .filter(({ pitchDeg }) => Math.sign(pitchDeg - frame.pitchDeg) === Math.sign(step));
+  const angle = ({ lookAtDeg }: Frame): number => Math.abs(((((lookAtDeg - frame.lookAtDeg + 180) % 360) + 360) % 360) - 180);
+  const [best] = candidates.sort(
+    (a, b) => Math.abs(a.pitchDeg - frame.pitchDeg) - Math.abs(b.pitchDeg - frame.pitchDeg) || angle(a) - angle(b),
+  );
   return best?.id ?? null;
 }

@@ -16,10 +16,14 @@ export interface ObjectStyle {
 }
 
 /** Lists the objects whose descendants a style includes. */
-export const listStyledIds = ({ colors, only, hidden, descendants = true }: ObjectStyle): number[] => (descendants ? [...(colors?.keys() ?? []), ...(only ?? []), ...(hidden ?? [])] : []);
+export const listStyledIds = ({ colors, only, hidden, descendants = true }: ObjectStyle): number[] =>
+  descendants ? [...(colors?.keys() ?? []), ...(only ?? []), ...(hidden ?? [])] : [];
 
 /** Converts a style; null: all objects are plain. @param below known descendants, which have the style of the nearest mentioned object */
-export function makeDrawStyles({ colors, only, others = "dimmed", hidden, descendants = true }: ObjectStyle, below: Descendants = new Map()): DrawStyles | null {
+export function makeDrawStyles(
+  { colors, only, others = "dimmed", hidden, descendants = true }: ObjectStyle,
+  below: Descendants = new Map(),
+): DrawStyles | null {
   const read = new Map<string, Rgb>();
   const rgbOf = (color: string): Rgb => {
     const rgb = read.get(color) ?? parseColor(color);
@@ -44,4 +48,5 @@ export function inherit<T>(values: Map<number, T>, below: Descendants): void {
   for (const [id, value] of above) for (const part of below.get(id) ?? []) if (!values.has(part)) values.set(part, value);
 }
 
-export const isHidden = (styles: DrawStyles | null, id: number): boolean => styles !== null && id !== 0 && (styles.byId.get(id) ?? styles.others) === "hidden";
+export const isHidden = (styles: DrawStyles | null, id: number): boolean =>
+  styles !== null && id !== 0 && (styles.byId.get(id) ?? styles.others) === "hidden";

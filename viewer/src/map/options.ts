@@ -61,7 +61,19 @@ export interface MapOptions {
 }
 
 /** Options without a fixed default. */
-type WithoutDefault = "center" | "zoom" | "minZoom" | "maxZoom" | "maxBounds" | "scaleBar" | "direction" | "light" | "background" | "language" | "pixelRatio" | "cacheBytes";
+type WithoutDefault =
+  | "center"
+  | "zoom"
+  | "minZoom"
+  | "maxZoom"
+  | "maxBounds"
+  | "scaleBar"
+  | "direction"
+  | "light"
+  | "background"
+  | "language"
+  | "pixelRatio"
+  | "cacheBytes";
 export type FilledOptions = MapOptions & Required<Omit<MapOptions, WithoutDefault | "dataSaver">> & { dataSaver: boolean };
 
 export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
@@ -80,7 +92,21 @@ export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
   finer: 0,
 };
 
-export const OPTIONS: readonly string[] = [...Object.keys(DEFAULTS), "center", "zoom", "minZoom", "maxZoom", "maxBounds", "scaleBar", "direction", "light", "background", "language", "pixelRatio", "cacheBytes"];
+export const OPTIONS: readonly string[] = [
+  ...Object.keys(DEFAULTS),
+  "center",
+  "zoom",
+  "minZoom",
+  "maxZoom",
+  "maxBounds",
+  "scaleBar",
+  "direction",
+  "light",
+  "background",
+  "language",
+  "pixelRatio",
+  "cacheBytes",
+];
 
 /** Options of `fitBounds`. */
 export interface FitOptions {
@@ -93,11 +119,30 @@ export interface FitOptions {
 }
 
 /** Types of a map's events. */
-export const EVENTS: readonly (keyof MapEvents)[] = ["ready", "load", "idle", "move", "moveend", "zoom", "directionchange", "lightchange", "preclick", "click", "mousemove", "select", "resize", "error", "contextlost", "contextrestored", "remove"];
+export const EVENTS: readonly (keyof MapEvents)[] = [
+  "ready",
+  "load",
+  "idle",
+  "move",
+  "moveend",
+  "zoom",
+  "directionchange",
+  "lightchange",
+  "preclick",
+  "click",
+  "mousemove",
+  "select",
+  "resize",
+  "error",
+  "contextlost",
+  "contextrestored",
+  "remove",
+];
 
 /** Whether the user wants to save data (Save-Data, or prefers-reduced-data). */
 export const savesData = (): boolean =>
-  (navigator as { connection?: { saveData?: boolean } }).connection?.saveData === true || matchMedia("(prefers-reduced-data: reduce)").matches;
+  (navigator as { connection?: { saveData?: boolean } }).connection?.saveData === true ||
+  matchMedia("(prefers-reduced-data: reduce)").matches;
 
 /** A click, and the picked object. */
 export interface ClickEvent extends Pick {

@@ -47,7 +47,10 @@ async function pickFromLayer(layer: imageLayer, viewState: ViewState, at: Vec2):
   const viewPoint = findViewPoint(layer, viewState, at);
   const pixel = viewPoint && pixelAt(viewPoint.view.frame, viewPoint.view.frame.zmax, ...viewPoint.uv);
   if (!pixel) return null;
-  const [ids, depths] = await Promise.all([fetchTile(layer, viewPoint.view, "id", pixel.tile), fetchTile(layer, viewPoint.view, "depth", pixel.tile)]);
+  const [ids, depths] = await Promise.all([
+    fetchTile(layer, viewPoint.view, "id", pixel.tile),
+    fetchTile(layer, viewPoint.view, "depth", pixel.tile),
+  ]);
   return readPick(layer, viewPoint.view, pixel, ids, depths);
 }
 
@@ -56,7 +59,11 @@ export function pickLoaded(layers: readonly imageLayer[], viewState: ViewState, 
   let nothing: Pick | null = null;
   for (const group of groupsAt(layers, viewState, at)) {
     const picks = group.map((layer) => pickLoadedFromLayer(layer, viewState, at));
-    const pick = findNearest(picks.map((found) => (found?.layer ? found : null)), group, viewState);
+    const pick = findNearest(
+      picks.map((found) => (found?.layer ? found : null)),
+      group,
+      viewState,
+    );
     if (pick) return pick;
     nothing ??= picks.find((found) => found !== null) ?? null;
   }
@@ -72,7 +79,13 @@ function pickLoadedFromLayer(layer: imageLayer, viewState: ViewState, at: Vec2):
     const pixel = pixelAt(frame, z, ...viewPoint.uv);
     if (!pixel) return null;
     const ids = findLoadedTile(layer, viewPoint.view, "id", pixel.tile);
-    if (ids) return readPick(layer, viewPoint.view, pixel, ids, findLoadedTile(layer, viewPoint.view, "depth", pixel.tile)) ?? { ...EMPTY_PICK, approximate: z < frame.zmax };
+    if (ids)
+      return (
+        readPick(layer, viewPoint.view, pixel, ids, findLoadedTile(layer, viewPoint.view, "depth", pixel.tile)) ?? {
+          ...EMPTY_PICK,
+          approximate: z < frame.zmax,
+        }
+      );
   }
   return null;
 }
@@ -84,8 +97,13 @@ function groupsAt(layers: readonly imageLayer[], { camera }: ViewState, [x, y]: 
 }
 
 /** Finds the pick of a group that the drawers show. */
-function findNearest(picks: readonly (Pick | null)[], group: readonly imageLayer[], { camera: { frame, zoom }, origin }: ViewState): Pick | null {
-  const depth = (pick: Pick, k: number): number => (pick.position ? dot(frame.axes.forward, sub(pick.position, origin)) - computeBias(frame, zoom, k) : Infinity);
+function findNearest(
+  picks: readonly (Pick | null)[],
+  group: readonly imageLayer[],
+  { camera: { frame, zoom }, origin }: ViewState,
+): Pick | null {
+  const depth = (pick: Pick, k: number): number =>
+    pick.position ? dot(frame.axes.forward, sub(pick.position, origin)) - computeBias(frame, zoom, k) : Infinity;
   const found = picks.flatMap((pick, k) => (pick ? [{ pick, depth: group.length > 1 ? depth(pick, k) : 0 }] : []));
   return found.reduce<(typeof found)[0] | null>((best, one) => (best && best.depth < one.depth ? best : one), null)?.pick ?? null;
 }

@@ -50,14 +50,23 @@ export class Relief {
    * Fetches the depths of a rectangle (U and V of the camera's frame) at the deepest level where it has at most `maxTiles` tiles. Missing
    * tiles are replaced by those in memory; the result is `approximate` then, and where the level is not the deepest.
    */
-  static async fetch(layers: readonly imageLayer[], viewState: ViewState, [low, high]: Rect, maxTiles: number, ids = false): Promise<{ relief: Relief; approximate: boolean }> {
+  static async fetch(
+    layers: readonly imageLayer[],
+    viewState: ViewState,
+    [low, high]: Rect,
+    maxTiles: number,
+    ids = false,
+  ): Promise<{ relief: Relief; approximate: boolean }> {
     const { frame } = viewState.camera;
-    const across = (z: number): number => (((high[0] - low[0]) * 2 ** z) / frame.size + 1) * (((high[1] - low[1]) * 2 ** z) / frame.size + 1);
+    const across = (z: number): number =>
+      (((high[0] - low[0]) * 2 ** z) / frame.size + 1) * (((high[1] - low[1]) * 2 ** z) / frame.size + 1);
     let zoom = frame.zmax;
     while (zoom > 0 && across(zoom) > maxTiles) zoom--;
     const relief = new Relief(layers, { ...viewState, camera: { ...viewState.camera, zoom }, dpr: 1, finer: 0 }, ids);
     await Promise.allSettled(relief.#layers.flatMap((layer) => layer.fetch([low, high])));
-    relief.#layers.forEach((layer) => { layer.clearPatches(); });
+    relief.#layers.forEach((layer) => {
+      layer.clearPatches();
+    });
     // Tiles may have failed, or have been dropped before the last one arrived.
     return { relief, approximate: zoom < frame.zmax || !relief.#layers.every((layer) => layer.isLoaded([low, high])) };
   }
@@ -161,7 +170,15 @@ class LayerDepths {
     return view && tiles && rendering?.layers.has("depth") ? new LayerDepths(layer, view, rendering, tiles, viewState, px, ids) : null;
   }
 
-  private constructor(layer: imageLayer, view: View, { json, layers }: Rendering, store: LayerTiles, { origin, dpr, finer }: ViewState, px: number, ids: boolean) {
+  private constructor(
+    layer: imageLayer,
+    view: View,
+    { json, layers }: Rendering,
+    store: LayerTiles,
+    { origin, dpr, finer }: ViewState,
+    px: number,
+    ids: boolean,
+  ) {
     [this.#layer, this.#view, this.#ids] = [layer, view, ids && layers.has("id")];
     this.#level = computeLevel(view.frame, px, dpr, finer);
     this.#tilesPerSide = 2 ** this.#level;
@@ -220,11 +237,15 @@ class LayerDepths {
   #tilesIn([low, high]: Rect): Tile[] {
     const { frame, occupancy } = this.#view;
     const [du, dv] = this.#shift;
-    return findCover(frame, (tile) => occupancy.has(tile), this.#level, [[low[0] + du, low[1] + dv], [high[0] + du, high[1] + dv]]);
+    return findCover(frame, (tile) => occupancy.has(tile), this.#level, [
+      [low[0] + du, low[1] + dv],
+      [high[0] + du, high[1] + dv],
+    ]);
   }
 
   sources(rect: Rect): unknown[] {
-    const of = (patch: Patch): unknown[] => (typeof patch === "string" ? [patch] : "children" in patch ? patch.children.flatMap(of) : [patch.depths]);
+    const of = (patch: Patch): unknown[] =>
+      typeof patch === "string" ? [patch] : "children" in patch ? patch.children.flatMap(of) : [patch.depths];
     return [this.#layer.drawStyles, ...this.#tilesIn(rect).flatMap((tile) => of(this.#getPatch(tile)))];
   }
 
@@ -234,7 +255,11 @@ class LayerDepths {
     const { z, x, y } = patch.tile;
     if ("children" in patch) {
       const half = size / 2 ** (z + 1);
-      return this.#readDepth(patch.children[(right >= (2 * x + 1) * half ? 1 : 0) + (down >= (2 * y + 1) * half ? 2 : 0)] as Patch, right, down);
+      return this.#readDepth(
+        patch.children[(right >= (2 * x + 1) * half ? 1 : 0) + (down >= (2 * y + 1) * half ? 2 : 0)] as Patch,
+        right,
+        down,
+      );
     }
     const i = clamp(Math.floor(right / patch.px) - x * tilePx, 0, tilePx - 1);
     const j = clamp(Math.floor(down / patch.px) - y * tilePx, 0, tilePx - 1);

@@ -11,7 +11,20 @@ export interface Size {
 
 /** Containers of maps. */
 const containers = new WeakSet<Element>();
-const LAYOUT_PROPERTIES = ["top", "right", "bottom", "left", "z-index", "flex-grow", "flex-shrink", "flex-basis", "align-self", "justify-self", "grid-area", "order"];
+const LAYOUT_PROPERTIES = [
+  "top",
+  "right",
+  "bottom",
+  "left",
+  "z-index",
+  "flex-grow",
+  "flex-shrink",
+  "flex-basis",
+  "align-self",
+  "justify-self",
+  "grid-area",
+  "order",
+];
 
 /** The map in the page: the canvas, wrapped in a container that replaces it in the layout. */
 export class Viewport {
@@ -26,9 +39,17 @@ export class Viewport {
   /** @param target a canvas or another element, or its id  @throws UsageError */
   constructor(target: string | HTMLElement, resized: () => void) {
     const found = (typeof target === "string" ? document.getElementById(target) : target) as HTMLElement;
-    if (!(found as Partial<Node> | null)?.nodeType) throw new UsageError(`${typeof target === "string" ? `no element has the id "${target}"` : "not an element"}; pass a <canvas> of the page, or its id`);
-    if (containers.has(found) || (found instanceof HTMLCanvasElement && found.parentElement && containers.has(found.parentElement))) throw new UsageError(`the element "${found.id}" has a map already; call its remove() first, or use another element`);
-    ({ container: this.container, canvas: this.#canvas, unwrap: this.#unwrap } = found instanceof HTMLCanvasElement ? wrapCanvas(found) : fillElement(found));
+    if (!(found as Partial<Node> | null)?.nodeType)
+      throw new UsageError(
+        `${typeof target === "string" ? `no element has the id "${target}"` : "not an element"}; pass a <canvas> of the page, or its id`,
+      );
+    if (containers.has(found) || (found instanceof HTMLCanvasElement && found.parentElement && containers.has(found.parentElement)))
+      throw new UsageError(`the element "${found.id}" has a map already; call its remove() first, or use another element`);
+    ({
+      container: this.container,
+      canvas: this.#canvas,
+      unwrap: this.#unwrap,
+    } = found instanceof HTMLCanvasElement ? wrapCanvas(found) : fillElement(found));
     containers.add(this.container);
     this.container.append(this.overlayPane, this.controlPane);
     this.#size = this.#measure();

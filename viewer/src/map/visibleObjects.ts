@@ -12,8 +12,14 @@ export interface VisibleObject {
 }
 
 /** Finds the visible objects of layers: those of the last layer first, the largest of each layer first. @param hidden includes objects that styles hide  @throws the error of a fetch */
-export async function findAllVisibleObjects(layers: readonly imageLayer[], viewState: ViewState, hidden: boolean): Promise<(VisibleObject & { readonly layer: imageLayer })[]> {
-  const found = await Promise.all([...layers].reverse().map(async (layer) => (await findVisibleObjects(layer, viewState, hidden)).map((seen) => ({ ...seen, layer }))));
+export async function findAllVisibleObjects(
+  layers: readonly imageLayer[],
+  viewState: ViewState,
+  hidden: boolean,
+): Promise<(VisibleObject & { readonly layer: imageLayer })[]> {
+  const found = await Promise.all(
+    [...layers].reverse().map(async (layer) => (await findVisibleObjects(layer, viewState, hidden)).map((seen) => ({ ...seen, layer }))),
+  );
   return found.flat();
 }
 
@@ -34,7 +40,10 @@ async function findVisibleObjects(layer: imageLayer, viewState: ViewState, hidde
   for (const [tile, data] of await Promise.all(cover.map(async (tile) => [tile, await tiles.fetch(view, info, tile)] as const))) {
     if (data?.kind !== "id") continue;
     const [u, v] = [frame.u0 + tile.x * frame.tilePx * pixel_m, frame.v0 - tile.y * frame.tilePx * pixel_m];
-    const inside = (from: number, to: number): [number, number] => [Math.max(0, Math.round(from / pixel_m)), Math.min(frame.tilePx, Math.round(to / pixel_m))];
+    const inside = (from: number, to: number): [number, number] => [
+      Math.max(0, Math.round(from / pixel_m)),
+      Math.min(frame.tilePx, Math.round(to / pixel_m)),
+    ];
     const [i0, i1] = inside(left - u, right - u);
     const [j0, j1] = inside(v - top, v - bottom);
     for (let j = j0; j < j1; j++) {

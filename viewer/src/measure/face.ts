@@ -46,7 +46,12 @@ export async function measureFace(map: map, position: Vec3, { signal }: FaceOpti
   const tile_m = size / last;
   const [x, y] = [Math.floor((u - u0) / tile_m), Math.floor((v0 - v) / tile_m)];
   for (let tiles: GridBounds = [x, y, x + 1, y + 1]; ;) {
-    const { relief, approximate } = await map.fetchRelief(state, rectOf(tiles, u0, v0, tile_m), Math.max(MAX_TILES * (256 / tilePx) ** 2, 4), true);
+    const { relief, approximate } = await map.fetchRelief(
+      state,
+      rectOf(tiles, u0, v0, tile_m),
+      Math.max(MAX_TILES * (256 / tilePx) ** 2, 4),
+      true,
+    );
     signal?.throwIfAborted();
     const px = relief.pixel_m;
     if (!(Math.abs(relief.depthAt(u, v) - d) <= TOLERANCE_PX * px + TOLERANCE_M)) return null;
@@ -61,7 +66,10 @@ export async function measureFace(map: map, position: Vec3, { signal }: FaceOpti
 /** Rectangle of tiles in U and V, inset slightly so that it does not touch the neighbouring tiles. */
 function rectOf([left, top, right, bottom]: GridBounds, u0: number, v0: number, tile_m: number): readonly [low: Vec2, high: Vec2] {
   const inset = 1e-6;
-  return [[u0 + (left + inset) * tile_m, v0 - (bottom - inset) * tile_m], [u0 + (right - inset) * tile_m, v0 - (top + inset) * tile_m]];
+  return [
+    [u0 + (left + inset) * tile_m, v0 - (bottom - inset) * tile_m],
+    [u0 + (right - inset) * tile_m, v0 - (top + inset) * tile_m],
+  ];
 }
 
 /** Doubles the bounds at each side that the region touches (bits). */
@@ -72,7 +80,13 @@ function widen(tiles: GridBounds, touched: number, last: number): GridBounds {
 }
 
 /** Computes the face of a region. @param origin world coordinates of the local origin */
-function faceOf({ plane, pixels, hidden, loops }: PlanarRegion, { axes, u0, v0 }: Frame, px: number, origin: Vec3, approximate: boolean): Face {
+function faceOf(
+  { plane, pixels, hidden, loops }: PlanarRegion,
+  { axes, u0, v0 }: Frame,
+  px: number,
+  origin: Vec3,
+  approximate: boolean,
+): Face {
   const [x, y] = [plane.x / px, plane.y / px];
   const stretch = Math.hypot(1, x, y);
   const normal = localFromUvd(axes, [x / stretch, -y / stretch, -1 / stretch]);
@@ -80,7 +94,9 @@ function faceOf({ plane, pixels, hidden, loops }: PlanarRegion, { axes, u0, v0 }
     area_m2: pixels * px * px * stretch,
     slope_deg: (Math.acos(Math.min(Math.abs(normal[2]), 1)) * 180) / Math.PI,
     normal,
-    outline: loops.map((loop) => loop.map(([column, row, depth]) => add(origin, localFromUvd(axes, [u0 + column * px, v0 - row * px, depth])))),
+    outline: loops.map((loop) =>
+      loop.map(([column, row, depth]) => add(origin, localFromUvd(axes, [u0 + column * px, v0 - row * px, depth]))),
+    ),
     hidden: hidden > HIDDEN_FRACTION,
     approximate,
   };

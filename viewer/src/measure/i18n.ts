@@ -4,9 +4,45 @@ import type { AreaMeasure, LineMeasure } from "./geometry";
 type Rows = readonly (readonly [label: string, value: string])[];
 
 const TRANSLATIONS = {
-  en: { profile: "Elevation profile", partHidden: "partly hidden", allHidden: "entirely hidden", hidden: "hidden", length: "Length", level: "Horizontal", rise: "Height difference", area: "Area", slope: "Slope", perimeter: "Perimeter", elevation: "Elevation" },
-  de: { profile: "Höhenprofil", partHidden: "teilweise verdeckt", allHidden: "vollständig verdeckt", hidden: "verdeckt", length: "Länge", level: "Horizontal", rise: "Höhenunterschied", area: "Fläche", slope: "Neigung", perimeter: "Umfang", elevation: "Höhenlage" },
-  fr: { profile: "Profil altimétrique", partHidden: "en partie masqué", allHidden: "entièrement masqué", hidden: "masqué", length: "Longueur", level: "Horizontale", rise: "Dénivelé", area: "Surface", slope: "Pente", perimeter: "Périmètre", elevation: "Altitude" },
+  en: {
+    profile: "Elevation profile",
+    partHidden: "partly hidden",
+    allHidden: "entirely hidden",
+    hidden: "hidden",
+    length: "Length",
+    level: "Horizontal",
+    rise: "Height difference",
+    area: "Area",
+    slope: "Slope",
+    perimeter: "Perimeter",
+    elevation: "Elevation",
+  },
+  de: {
+    profile: "Höhenprofil",
+    partHidden: "teilweise verdeckt",
+    allHidden: "vollständig verdeckt",
+    hidden: "verdeckt",
+    length: "Länge",
+    level: "Horizontal",
+    rise: "Höhenunterschied",
+    area: "Fläche",
+    slope: "Neigung",
+    perimeter: "Umfang",
+    elevation: "Höhenlage",
+  },
+  fr: {
+    profile: "Profil altimétrique",
+    partHidden: "en partie masqué",
+    allHidden: "entièrement masqué",
+    hidden: "masqué",
+    length: "Longueur",
+    level: "Horizontale",
+    rise: "Dénivelé",
+    area: "Surface",
+    slope: "Pente",
+    perimeter: "Périmètre",
+    elevation: "Altitude",
+  },
 };
 
 /** Messages of the measuring tools, and lengths and areas formatted for the user's language. */
@@ -53,20 +89,32 @@ export class MeasureMessages {
     const { length, level, rise } = this.#messages;
     const horizontal = [level, prefix + this.length(horizontal_m)] as const;
     const difference = [rise, prefix + this.rise(rise_m)] as const;
-    return isHeight ? [difference, horizontal] : [[length, prefix + this.length(length_m)], ...(steps_m.length < 2 ? [horizontal] : []), difference];
+    return isHeight
+      ? [difference, horizontal]
+      : [[length, prefix + this.length(length_m)], ...(steps_m.length < 2 ? [horizontal] : []), difference];
   }
 
   /** Describes a polygon, or a face, which has no perimeter. */
-  describeArea({ area_m2, slope_deg, perimeter_m }: Pick<AreaMeasure, "area_m2" | "slope_deg"> & Partial<AreaMeasure>, prefix: string): Rows {
+  describeArea(
+    { area_m2, slope_deg, perimeter_m }: Pick<AreaMeasure, "area_m2" | "slope_deg"> & Partial<AreaMeasure>,
+    prefix: string,
+  ): Rows {
     const { area, slope, perimeter } = this.#messages;
-    return [[area, prefix + this.area(area_m2)], ...(perimeter_m === undefined ? [] : [[perimeter, prefix + this.length(perimeter_m)] as const]), [slope, `${slope_deg.toFixed(0)}°`]];
+    return [
+      [area, prefix + this.area(area_m2)],
+      ...(perimeter_m === undefined ? [] : [[perimeter, prefix + this.length(perimeter_m)] as const]),
+      [slope, `${slope_deg.toFixed(0)}°`],
+    ];
   }
 
   /** Describes a profile by its horizontal length and its lowest and highest point. */
   describeProfile(length_m: number, heights_m: Float64Array, approximate: boolean): Rows {
     const known = [...heights_m].filter((height) => !Number.isNaN(height));
     const { level, elevation } = this.#messages;
-    return [[level, (approximate ? "≈ " : "") + this.length(length_m)], [elevation, known.length > 0 ? this.range(Math.min(...known), Math.max(...known)) : this.#messages.allHidden]];
+    return [
+      [level, (approximate ? "≈ " : "") + this.length(length_m)],
+      [elevation, known.length > 0 ? this.range(Math.min(...known), Math.max(...known)) : this.#messages.allHidden],
+    ];
   }
 
   get profile(): string {

@@ -42,7 +42,9 @@ export class measure extends MapLayer<map, MeasureEvents> {
   readonly options: Required<Omit<MeasureOptions, "language">> & Pick<MeasureOptions, "language">;
   #messages = new MeasureMessages(undefined);
   readonly #overlay = new MeasureOverlay();
-  readonly #chart = new ProfileChart((at) => { this.#onCursorMove(at); });
+  readonly #chart = new ProfileChart((at) => {
+    this.#onCursorMove(at);
+  });
   #corners: readonly Corner[] = [];
   #profile: Profile | null = null;
   #face: Face | null = null;
@@ -81,12 +83,18 @@ export class measure extends MapLayer<map, MeasureEvents> {
 
   /** What is measured, as labels and values in the user's language; empty until there are enough corners. */
   get results(): readonly (readonly [label: string, value: string])[] {
-    const { options: { kind }, line, area } = this;
+    const {
+      options: { kind },
+      line,
+      area,
+    } = this;
     const count = this.#corners.length;
-    if (kind === "profile") return this.#profile ? this.#messages.describeProfile(line.horizontal_m, this.#profile.heights_m, this.#profile.approximate) : [];
+    if (kind === "profile")
+      return this.#profile ? this.#messages.describeProfile(line.horizontal_m, this.#profile.heights_m, this.#profile.approximate) : [];
     const prefix = this.#prefix();
     if (kind !== "area") return count < 2 ? [] : this.#messages.describeLine(line, kind === "height", prefix);
-    if (this.#face) return this.#messages.describeArea(this.#face, `${this.#face.approximate ? "≈ " : prefix}${this.#face.hidden ? "≥ " : ""}`);
+    if (this.#face)
+      return this.#messages.describeArea(this.#face, `${this.#face.approximate ? "≈ " : prefix}${this.#face.hidden ? "≥ " : ""}`);
     return count < 3 ? [] : this.#messages.describeArea(area, prefix);
   }
 
@@ -151,13 +159,21 @@ export class measure extends MapLayer<map, MeasureEvents> {
   async #read(): Promise<void> {
     this.#abortReading.abort();
     [this.#profile, this.#face] = [null, null];
-    const { map, options: { kind } } = this;
+    const {
+      map,
+      options: { kind },
+    } = this;
     const count = this.#corners.length;
     const { signal } = (this.#abortReading = new AbortController());
     if (kind !== "profile" || count < 2) this.#closeChart();
     if (!map) return;
     this.#direction = map.direction;
-    const reading = kind === "profile" && count > 1 ? this.#readProfile(map, signal) : kind === "area" && count === 1 ? this.#readFace(map, signal) : null;
+    const reading =
+      kind === "profile" && count > 1
+        ? this.#readProfile(map, signal)
+        : kind === "area" && count === 1
+          ? this.#readFace(map, signal)
+          : null;
     await reading?.catch((reason: unknown) => {
       if (!signal.aborted) map.layerContext?.report(asError(reason));
     });
@@ -176,7 +192,9 @@ export class measure extends MapLayer<map, MeasureEvents> {
     if (signal.aborted) return;
     this.#profile = profile;
     const samples = samplePoints(this.#points(), profile.heights_m.length);
-    this.#overlay.setCourse(samples.map(({ position: [x, y] }, k) => (Number.isNaN(profile.heights_m[k]) ? null : [x, y, profile.heights_m[k] as number])));
+    this.#overlay.setCourse(
+      samples.map(({ position: [x, y] }, k) => (Number.isNaN(profile.heights_m[k]) ? null : [x, y, profile.heights_m[k] as number])),
+    );
     this.#updateOverlay();
     this.#chart.set(profile, this.#messages, profile.approximate ? "≈ " : "");
     map.overlayPane.append(this.#chart.box);
@@ -212,7 +230,8 @@ export class measure extends MapLayer<map, MeasureEvents> {
     this.#overlay.set(points, kind === "area", kind === "area" ? this.#areaLabels(points) : this.#lineLabels(points));
     const [from, to] = points;
     // A plumb line from the lower point, then a level line.
-    if (kind === "height" && from && to) this.#overlay.setCourse(from[2] < to[2] ? [from, [from[0], from[1], to[2]], to] : [to, [to[0], to[1], from[2]], from]);
+    if (kind === "height" && from && to)
+      this.#overlay.setCourse(from[2] < to[2] ? [from, [from[0], from[1], to[2]], to] : [to, [to[0], to[1], from[2]], from]);
     if (this.#face) this.#overlay.setCourse(this.#face.outline.flatMap((loop) => [...loop, loop[0] as Vec3, null]));
     this.#updateOverlay();
   }
@@ -221,7 +240,10 @@ export class measure extends MapLayer<map, MeasureEvents> {
     const last = points.at(-1);
     if (!last || points.length < 2) return [];
     const { length_m, rise_m, steps_m } = this.line;
-    const steps = steps_m.length < 2 ? [] : steps_m.map((step, k) => ({ at: mix(points[k] as Vec3, points[k + 1] as Vec3), text: this.#messages.length(step), main: false }));
+    const steps =
+      steps_m.length < 2
+        ? []
+        : steps_m.map((step, k) => ({ at: mix(points[k] as Vec3, points[k + 1] as Vec3), text: this.#messages.length(step), main: false }));
     const length = this.options.kind === "height" ? "" : `${this.#messages.length(length_m)}  `;
     return [...steps, { at: last, text: `${this.#prefix()}${length}${this.#messages.rise(rise_m)}`, main: true }];
   }
@@ -234,7 +256,10 @@ export class measure extends MapLayer<map, MeasureEvents> {
     return [{ at: middle, text: this.#areaText(this.area, {}), main: true }];
   }
 
-  #areaText({ area_m2, slope_deg }: Pick<AreaMeasure, "area_m2" | "slope_deg">, { hidden = false, approximate = false }: Partial<Face>): string {
+  #areaText(
+    { area_m2, slope_deg }: Pick<AreaMeasure, "area_m2" | "slope_deg">,
+    { hidden = false, approximate = false }: Partial<Face>,
+  ): string {
     return `${approximate ? "≈ " : this.#prefix()}${hidden ? "≥ " : ""}${this.#messages.area(area_m2)}  ∠ ${slope_deg.toFixed(0)}°`;
   }
 
@@ -244,4 +269,8 @@ export class measure extends MapLayer<map, MeasureEvents> {
   }
 }
 
-const mix = (a: Vec3, b: Vec3, share = 0.5, rest = 1 - share): Vec3 => [a[0] * rest + b[0] * share, a[1] * rest + b[1] * share, a[2] * rest + b[2] * share];
+const mix = (a: Vec3, b: Vec3, share = 0.5, rest = 1 - share): Vec3 => [
+  a[0] * rest + b[0] * share,
+  a[1] * rest + b[1] * share,
+  a[2] * rest + b[2] * share,
+];

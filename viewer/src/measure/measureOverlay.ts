@@ -59,7 +59,9 @@ export class MeasureOverlay {
       const at = project(point);
       return at ? [at] : [];
     });
-    const shape = this.#course ? svgPath(this.#course.map((position) => position && project(position))) : svgPath(corners) + (this.#closed && corners.length > 2 ? "Z" : "");
+    const shape = this.#course
+      ? svgPath(this.#course.map((position) => position && project(position)))
+      : svgPath(corners) + (this.#closed && corners.length > 2 ? "Z" : "");
     for (const path of [this.#halo, this.#line]) path.setAttribute("d", shape);
     this.#line.classList.toggle("map3d-measure-filled", this.#closed);
     this.#placeCorners(corners);
@@ -69,7 +71,8 @@ export class MeasureOverlay {
     for (const { label, span } of this.#items) {
       const at = project(label.at);
       span.hidden = !at;
-      if (at) span.style.transform = `translate(${at[0].toFixed(1)}px, ${at[1].toFixed(1)}px) translate(-50%, ${label.main ? "-160%" : "-50%"})`;
+      if (at)
+        span.style.transform = `translate(${at[0].toFixed(1)}px, ${at[1].toFixed(1)}px) translate(-50%, ${label.main ? "-160%" : "-50%"})`;
     }
   }
 

@@ -23,7 +23,9 @@ function bordersOf(mask: Uint8Array, width: number): Uint8Array {
   const corners = [width, 0, 1, width + 1];
   const beside = [-1, -width, 1, width];
   for (let at = 0; at < mask.length; at++) {
-    if (mask[at]) for (let way = 0; way < 4; way++) if (!mask[at + (beside[way] as number)]) (ways[at + (corners[way] as number)] as number) |= 1 << way;
+    if (mask[at])
+      for (let way = 0; way < 4; way++)
+        if (!mask[at + (beside[way] as number)]) (ways[at + (corners[way] as number)] as number) |= 1 << way;
   }
   return ways;
 }
@@ -60,4 +62,5 @@ function simplifyLine(line: readonly PixelCorner[]): PixelCorner[] {
   return [...simplifyLine(line.slice(0, half + 1)), ...simplifyLine(line.slice(half))];
 }
 
-const farthest = (line: readonly PixelCorner[], far: (corner: PixelCorner) => number): number => line.reduce((best, corner, k) => (far(corner) > far(line[best] as PixelCorner) ? k : best), 0);
+const farthest = (line: readonly PixelCorner[], far: (corner: PixelCorner) => number): number =>
+  line.reduce((best, corner, k) => (far(corner) > far(line[best] as PixelCorner) ? k : best), 0);

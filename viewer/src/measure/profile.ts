@@ -40,11 +40,18 @@ export async function measureProfile(map: map, points: readonly Vec3[], { sample
   for (let first = 0; first < places.length; first += size) {
     signal?.throwIfAborted();
     const part = places.slice(first, first + size).map(({ position }) => sub(position, state.origin));
-    const corners = part.flatMap((position) => span.map((z): Vec2 => [dot(axes.right, position), horizontalDot(axes.up, position) + axes.up[2] * z]));
-    const rect = [[minimum(corners, 0), minimum(corners, 1)], [-minimum(corners, 0, -1), -minimum(corners, 1, -1)]] as const;
+    const corners = part.flatMap((position) =>
+      span.map((z): Vec2 => [dot(axes.right, position), horizontalDot(axes.up, position) + axes.up[2] * z]),
+    );
+    const rect = [
+      [minimum(corners, 0), minimum(corners, 1)],
+      [-minimum(corners, 0, -1), -minimum(corners, 1, -1)],
+    ] as const;
     const found = await map.fetchRelief(state, rect, MAX_TILES);
     approximate ||= found.approximate;
-    part.forEach((position, k) => { heights_m[first + k] = heightAt(found.relief, axes, position, span) + state.origin[2]; });
+    part.forEach((position, k) => {
+      heights_m[first + k] = heightAt(found.relief, axes, position, span) + state.origin[2];
+    });
   }
   return { distances_m, heights_m, approximate };
 }
@@ -67,7 +74,12 @@ export function samplePoints(points: readonly Vec3[], samples: number): { positi
  * Returns the greatest local height at which the vertical through a position meets the visible surface; NaN if it does not. On the screen the vertical is a
  * column of pixels. From the top down, it meets the surface where the surface changes continuously from behind the vertical to in front of it.
  */
-export function heightAt(relief: Pick<Relief, "depthAt" | "pixel_m">, { right, up, forward }: Axes, position: Vec3, [low, high]: Vec2): number {
+export function heightAt(
+  relief: Pick<Relief, "depthAt" | "pixel_m">,
+  { right, up, forward }: Axes,
+  position: Vec3,
+  [low, high]: Vec2,
+): number {
   const [u, v0, d0] = [dot(right, position), horizontalDot(up, position), horizontalDot(forward, position)];
   if (up[2] < 1e-6) {
     const depth = relief.depthAt(u, v0);
@@ -79,7 +91,8 @@ export function heightAt(relief: Pick<Relief, "depthAt" | "pixel_m">, { right, u
   let above = behind(high + step);
   for (let z = high; z >= low - step; z -= step) {
     const here = behind(z);
-    if (above >= 0 && here <= 0 && above - here <= MAX_STEP_PX * relief.pixel_m) return above === here ? z : z + (step * -here) / (above - here);
+    if (above >= 0 && here <= 0 && above - here <= MAX_STEP_PX * relief.pixel_m)
+      return above === here ? z : z + (step * -here) / (above - here);
     above = here;
   }
   return NaN;
@@ -88,4 +101,5 @@ export function heightAt(relief: Pick<Relief, "depthAt" | "pixel_m">, { right, u
 const horizontalDot = (axis: Vec3, position: Vec3): number => axis[0] * position[0] + axis[1] * position[1];
 
 /** Returns the least coordinate times `sign`. */
-const minimum = (points: readonly Vec2[], k: 0 | 1, sign = 1): number => points.reduce((best, point) => Math.min(best, sign * point[k]), Infinity);
+const minimum = (points: readonly Vec2[], k: 0 | 1, sign = 1): number =>
+  points.reduce((best, point) => Math.min(best, sign * point[k]), Infinity);

@@ -28,14 +28,33 @@ export class ProfileChart {
     this.#svg.setAttribute("viewBox", `0 0 ${String(WIDTH)} ${String(HEIGHT)}`);
     this.#svg.setAttribute("preserveAspectRatio", "none");
     this.#svg.setAttribute("aria-hidden", "true");
-    const field = element("div", "map3d-profile-field", {}, element("div", "map3d-profile-plot", {}, this.#svg, this.#cursor), this.#heights);
+    const field = element(
+      "div",
+      "map3d-profile-field",
+      {},
+      element("div", "map3d-profile-plot", {}, this.#svg, this.#cursor),
+      this.#heights,
+    );
     this.box.append(field, this.#readout);
-    this.box.addEventListener("pointermove", ({ clientX }) => { this.#moveTo(clientX); });
-    this.box.addEventListener("pointerdown", ({ clientX }) => { this.#moveTo(clientX); });
-    this.box.addEventListener("pointerleave", () => { this.#show(null); });
-    this.box.addEventListener("blur", () => { this.#show(null); });
-    this.box.addEventListener("keydown", (event) => { this.#onKeyDown(event); });
-    for (const type of ["pointerdown", "wheel", "click", "dblclick"]) this.box.addEventListener(type, (event) => { event.stopPropagation(); });
+    this.box.addEventListener("pointermove", ({ clientX }) => {
+      this.#moveTo(clientX);
+    });
+    this.box.addEventListener("pointerdown", ({ clientX }) => {
+      this.#moveTo(clientX);
+    });
+    this.box.addEventListener("pointerleave", () => {
+      this.#show(null);
+    });
+    this.box.addEventListener("blur", () => {
+      this.#show(null);
+    });
+    this.box.addEventListener("keydown", (event) => {
+      this.#onKeyDown(event);
+    });
+    for (const type of ["pointerdown", "wheel", "click", "dblclick"])
+      this.box.addEventListener(type, (event) => {
+        event.stopPropagation();
+      });
   }
 
   /** Index of the sample at the cursor; null without a cursor. */
@@ -50,23 +69,43 @@ export class ProfileChart {
     const [low, high] = known.length > 0 ? [Math.min(...known), Math.max(...known)] : [0, 1];
     const margin = Math.max(0.08 * (high - low), 0.5);
     this.#range = [low - margin, high + margin];
-    this.#svg.replaceChildren(...this.#grid(messages), path("map3d-profile-fill", this.#shape(true)), path("map3d-profile-line", this.#shape(false)));
+    this.#svg.replaceChildren(
+      ...this.#grid(messages),
+      path("map3d-profile-fill", this.#shape(true)),
+      path("map3d-profile-line", this.#shape(false)),
+    );
     const length = profile.distances_m.at(-1) ?? 0;
-    const text = known.length > 0 ? `${prefix}${messages.length(length)}  ${messages.range(low, high)}${known.length < profile.heights_m.length ? `  ${messages.partHidden}` : ""}` : messages.allHidden;
-    for (const [name, value] of Object.entries({ "aria-label": messages.profile, "aria-valuemin": "0", "aria-valuemax": length.toFixed(2), "aria-valuenow": "0", "aria-valuetext": text })) this.box.setAttribute(name, value);
+    const text =
+      known.length > 0
+        ? `${prefix}${messages.length(length)}  ${messages.range(low, high)}${known.length < profile.heights_m.length ? `  ${messages.partHidden}` : ""}`
+        : messages.allHidden;
+    for (const [name, value] of Object.entries({
+      "aria-label": messages.profile,
+      "aria-valuemin": "0",
+      "aria-valuemax": length.toFixed(2),
+      "aria-valuenow": "0",
+      "aria-valuetext": text,
+    }))
+      this.box.setAttribute(name, value);
     this.box.dataset["summary"] = text;
     this.#show(null);
   }
 
   #grid(messages: MeasureMessages): SVGElement[] {
     const [low, high] = this.#range;
-    const step = floorToRound((high - low) / GRID_LINES) * ((high - low) / GRID_LINES / floorToRound((high - low) / GRID_LINES) >= 2 ? 2 : 1);
-    const heights = Array.from({ length: Math.max(0, Math.floor(high / step) - Math.ceil(low / step) + 1) }, (_, k) => (Math.ceil(low / step) + k) * step);
-    this.#heights.replaceChildren(...heights.map((height) => {
-      const label = element("span", "", {}, messages.height(height));
-      label.style.top = `${this.#y(height).toFixed(1)}%`;
-      return label;
-    }));
+    const step =
+      floorToRound((high - low) / GRID_LINES) * ((high - low) / GRID_LINES / floorToRound((high - low) / GRID_LINES) >= 2 ? 2 : 1);
+    const heights = Array.from(
+      { length: Math.max(0, Math.floor(high / step) - Math.ceil(low / step) + 1) },
+      (_, k) => (Math.ceil(low / step) + k) * step,
+    );
+    this.#heights.replaceChildren(
+      ...heights.map((height) => {
+        const label = element("span", "", {}, messages.height(height));
+        label.style.top = `${this.#y(height).toFixed(1)}%`;
+        return label;
+      }),
+    );
     return heights.map((height) => path("map3d-profile-grid", `M0 ${this.#y(height).toFixed(2)}H${String(WIDTH)}`));
   }
 
@@ -119,7 +158,8 @@ export class ProfileChart {
     if (!profile || !messages) return;
     this.#at = at;
     this.#cursor.hidden = at === null;
-    const text = at === null ? (this.box.dataset["summary"] ?? "") : messages.formatSample(profile.distances_m[at] ?? 0, profile.heights_m[at] ?? NaN);
+    const text =
+      at === null ? (this.box.dataset["summary"] ?? "") : messages.formatSample(profile.distances_m[at] ?? 0, profile.heights_m[at] ?? NaN);
     this.#readout.textContent = text;
     if (at !== null) {
       this.#cursor.style.left = `${((100 * this.#x(at)) / WIDTH).toFixed(2)}%`;

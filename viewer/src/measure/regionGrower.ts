@@ -79,7 +79,12 @@ export class RegionGrower {
     [this.#source, this.#window, this.#width, this.#height] = [source, window, right - left + 2 * PAD, bottom - top + 2 * PAD];
     [this.#x, this.#y, this.#steps] = [column - left + PAD, row - top + PAD, stepsOf(this.#width)];
     const size = this.#width * this.#height;
-    [this.#depths, this.#kinds, this.#mask, this.#found] = [new Float32Array(size), new Uint8Array(size), new Uint8Array(size), new Int32Array(size)];
+    [this.#depths, this.#kinds, this.#mask, this.#found] = [
+      new Float32Array(size),
+      new Uint8Array(size),
+      new Uint8Array(size),
+      new Int32Array(size),
+    ];
     const [u, v] = this.#centerOf(this.#x, this.#y);
     [this.#d, this.#id] = [source.depthAt(u, v), source.idAt(u, v)];
   }
@@ -92,14 +97,20 @@ export class RegionGrower {
     for (let [radius, rounds] = [FIRST_RADIUS_PX, 2]; rounds > 0; radius *= 2) {
       if (radius === Infinity) rounds--;
       const tolerance_m = this.#tolerance(plane);
-      const more = this.#fillMask(plane, radius === Infinity ? Math.min(tolerance_m, FINAL_TOLERANCE_M * this.#areaFactor(plane) + 3 * plane.rms_m) : tolerance_m, radius);
+      const more = this.#fillMask(
+        plane,
+        radius === Infinity ? Math.min(tolerance_m, FINAL_TOLERANCE_M * this.#areaFactor(plane) + 3 * plane.rms_m) : tolerance_m,
+        radius,
+      );
       if (this.#touches & this.#window.open) return this.#touches;
       plane = this.#fitPlane(true) ?? this.#fitPlane() ?? plane;
       if (!more) radius = Infinity;
     }
     const { d, x, y } = plane;
     const [left, top] = this.#window.bounds;
-    const loops = loopsOf(this.#mask, this.#width).map((loop) => loop.map(([i, j]) => [i + left - PAD, j + top - PAD, this.#d + d + x * (i - 0.5 - this.#x) + y * (j - 0.5 - this.#y)] as const));
+    const loops = loopsOf(this.#mask, this.#width).map((loop) =>
+      loop.map(([i, j]) => [i + left - PAD, j + top - PAD, this.#d + d + x * (i - 0.5 - this.#x) + y * (j - 0.5 - this.#y)] as const),
+    );
     return { plane, ...this.#measureBorder(plane), loops };
   }
 
@@ -154,7 +165,11 @@ export class RegionGrower {
       if (!within || this.#steps.every((way) => this.#mask[at + way])) counted.push(at);
     }
     const n = counted.length;
-    const sum = (of: (x: number, y: number, d: number) => number): number => counted.reduce((all, at) => all + of((at % this.#width) - this.#x, Math.floor(at / this.#width) - this.#y, this.#depths[at] as number), 0);
+    const sum = (of: (x: number, y: number, d: number) => number): number =>
+      counted.reduce(
+        (all, at) => all + of((at % this.#width) - this.#x, Math.floor(at / this.#width) - this.#y, this.#depths[at] as number),
+        0,
+      );
     const [mx, my, md] = [sum((x) => x) / n, sum((_, y) => y) / n, sum((_x, _y, d) => d) / n];
     const [xx, xy, yy] = [sum((x) => (x - mx) ** 2), sum((x, y) => (x - mx) * (y - my)), sum((_, y) => (y - my) ** 2)];
     const [xd, yd] = [sum((x, _, d) => (x - mx) * (d - md)), sum((_, y, d) => (y - my) * (d - md))];
@@ -213,7 +228,11 @@ export class RegionGrower {
   }
 
   #centerOf(i: number, j: number): [u: number, v: number] {
-    const { u0, v0, bounds: [left, top] } = this.#window;
+    const {
+      u0,
+      v0,
+      bounds: [left, top],
+    } = this.#window;
     const px = this.#source.pixel_m;
     return [u0 + (left + i - PAD + 0.5) * px, v0 - (top + j - PAD + 0.5) * px];
   }

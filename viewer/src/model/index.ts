@@ -1,3 +1,11 @@
 /** map3d-model: shows 3D models between the images, drawn by the page's three.js. */
-export { modelLayer, modelLayer as ModelLayer, type ModelClick, type ModelLayerEvents, type ModelLayerOptions, type ModelSource, type PlayOptions } from "./modelLayer";
+export {
+  modelLayer,
+  modelLayer as ModelLayer,
+  type ModelClick,
+  type ModelLayerEvents,
+  type ModelLayerOptions,
+  type ModelSource,
+  type PlayOptions,
+} from "./modelLayer";
 export type { ModelLoader, Three, ThreeClip } from "./threeTypes";

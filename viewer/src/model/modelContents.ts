@@ -7,7 +7,8 @@ export interface ModelContents {
   readonly clips: readonly ThreeClip[];
 }
 
-const isNode = (value: unknown): value is ThreeNode => typeof value === "object" && value !== null && (value as { isObject3D?: unknown }).isObject3D === true;
+const isNode = (value: unknown): value is ThreeNode =>
+  typeof value === "object" && value !== null && (value as { isObject3D?: unknown }).isObject3D === true;
 
 /** Accepts an Object3D or the result of GLTFLoader, `{ scene, animations }`. @throws UsageError for anything else */
 export function readModelContents(source: unknown, name: string): ModelContents {
@@ -38,7 +39,8 @@ interface Material extends Disposable {
   metalness?: number;
 }
 
-const materialsOf = ({ material }: ThreeResources): readonly Material[] => (material ? [material].flat<(Material | readonly Material[])[]>() : []);
+const materialsOf = ({ material }: ThreeResources): readonly Material[] =>
+  material ? [material].flat<(Material | readonly Material[])[]>() : [];
 
 /** Is it a skinned mesh, whose bounding box depends on its bones? */
 export const isSkinned = (node: ThreeNode): boolean => (node as ThreeResources).isSkinnedMesh === true;
@@ -66,7 +68,8 @@ export function disposeGpuResources(object: ThreeNode): void {
     resources.skeleton?.dispose();
     if (resources.isInstancedMesh) resources.dispose?.();
     for (const material of materialsOf(resources)) {
-      for (const value of Object.values(material) as unknown[]) if ((value as { isTexture?: boolean } | null)?.isTexture) (value as Disposable).dispose();
+      for (const value of Object.values(material) as unknown[])
+        if ((value as { isTexture?: boolean } | null)?.isTexture) (value as Disposable).dispose();
       material.dispose();
     }
   });

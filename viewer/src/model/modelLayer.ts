@@ -50,7 +50,8 @@ export interface ModelLayerEvents<T extends Three = Three> {
 }
 
 /** A URL, an Object3D, or the result of GLTFLoader. */
-export type ModelSource<T extends Three> = string | InstanceType<T["Object3D"]> | { readonly scene: InstanceType<T["Object3D"]>; readonly animations?: readonly ThreeClip[] };
+export type ModelSource<T extends Three> =
+  string | InstanceType<T["Object3D"]> | { readonly scene: InstanceType<T["Object3D"]>; readonly animations?: readonly ThreeClip[] };
 
 /** First release of three.js with the light units that are used here. */
 const MIN_REVISION = 155;
@@ -78,8 +79,12 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
   /** @param three the page's three.js, r155 or newer  @param source a URL, an Object3D, or the result of GLTFLoader  @throws UsageError */
   constructor(three: T, source: ModelSource<T>, options: ModelLayerOptions) {
     super();
-    if (!(parseInt(three.REVISION) >= MIN_REVISION)) throw new UsageError(`a modelLayer needs three.js r${MIN_REVISION} or newer, got ${three.REVISION ? `r${three.REVISION}` : typeof three}`);
-    if (typeof source === "string" && !options.loader) throw new UsageError(`a modelLayer needs a loader for "${source}", e.g. { loader: GLTFLoader }`);
+    if (!(parseInt(three.REVISION) >= MIN_REVISION))
+      throw new UsageError(
+        `a modelLayer needs three.js r${MIN_REVISION} or newer, got ${three.REVISION ? `r${three.REVISION}` : typeof three}`,
+      );
+    if (typeof source === "string" && !options.loader)
+      throw new UsageError(`a modelLayer needs a loader for "${source}", e.g. { loader: GLTFLoader }`);
     this.#three = three;
     this.#source = source;
     this.options = options;
@@ -186,7 +191,12 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
       throw reason;
     });
     // A lost context cannot create resources.
-    if (map.canvas.getContext("webgl2")?.isContextLost()) await new Promise<void>((resolve) => map.once("contextrestored", () => { resolve(); }));
+    if (map.canvas.getContext("webgl2")?.isContextLost())
+      await new Promise<void>((resolve) =>
+        map.once("contextrestored", () => {
+          resolve();
+        }),
+      );
     if (this.map !== map) return;
     this.#contents ??= this.#addToPivot(contents);
     ModelRenderer.add(map, this.#three, this.#sceneModel);
@@ -203,7 +213,10 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
     if (typeof source !== "string" || !loader) return readModelContents(source, "the source of a modelLayer");
     const reader = typeof loader === "function" ? new loader() : loader;
     const loaded = await reader.loadAsync(source).catch((reason: unknown) => {
-      throw new FetchError(`${source}: ${reason instanceof Error ? reason.message : String(reason)}`, (reason as { response?: Response } | null)?.response?.status);
+      throw new FetchError(
+        `${source}: ${reason instanceof Error ? reason.message : String(reason)}`,
+        (reason as { response?: Response } | null)?.response?.status,
+      );
     });
     return readModelContents(loaded, source);
   }
@@ -216,12 +229,16 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
 
   #playClips({ object, clips }: ModelContents, { names, loop }: { names: readonly string[]; loop: boolean }): void {
     const unknown = names.find((name) => !clips.some((clip) => clip.name === name));
-    if (unknown !== undefined) throw new UsageError(`unknown animation "${unknown}"; the model has ${clips.map(({ name }) => `"${name}"`).join(", ") || "none"}`);
+    if (unknown !== undefined)
+      throw new UsageError(`unknown animation "${unknown}"; the model has ${clips.map(({ name }) => `"${name}"`).join(", ") || "none"}`);
     const mixer = (this.#mixer ??= new this.#three.AnimationMixer(object as never));
     for (const clip of clips.filter(({ name }) => names.length === 0 || names.includes(name))) {
       const action = mixer.clipAction(clip);
       action.clampWhenFinished = true;
-      action.reset().setLoop((loop ? this.#three.LoopRepeat : this.#three.LoopOnce) as never, Infinity).play();
+      action
+        .reset()
+        .setLoop((loop ? this.#three.LoopRepeat : this.#three.LoopOnce) as never, Infinity)
+        .play();
       if (!this.#actions.includes(action)) this.#actions.push(action);
     }
     this.redraw();
@@ -263,7 +280,10 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
     const box = new this.#three.Box3();
     box.setFromObject(this.#pivot);
     if (box.isEmpty()) return [];
-    const [low, high]: Box3 = [[box.min.x, box.min.y, box.min.z], [box.max.x, box.max.y, box.max.z]];
+    const [low, high]: Box3 = [
+      [box.min.x, box.min.y, box.min.z],
+      [box.max.x, box.max.y, box.max.z],
+    ];
     const size = this.#skinned ? sub(high, low) : ([0, 0, 0] as const);
     return [[sub(low, size), add(high, size)]];
   }

@@ -85,18 +85,33 @@ export class ModelRenderer implements CustomLayer {
     this.#renderer = new three.WebGLRenderer({ canvas: map.canvas, context: gl });
     this.#renderer.setClearColor(0, 0);
     this.#renderer.resetState();
-    [this.#scene, this.#camera, this.#sky, this.#sun] = [new three.Scene(), new three.OrthographicCamera(), new three.AmbientLight(), new three.DirectionalLight()];
+    [this.#scene, this.#camera, this.#sky, this.#sun] = [
+      new three.Scene(),
+      new three.OrthographicCamera(),
+      new three.AmbientLight(),
+      new three.DirectionalLight(),
+    ];
     this.#camera.matrixAutoUpdate = false;
     this.#scene.add(this.#sky);
     this.#scene.add(this.#sun);
     adoptStyles(document, STYLES);
-    map.toggleCustomLayer(this).on("preclick", this.#onClick).on("mousemove", this.#onMouseMove).on("contextlost", this.#onContextLost).on("contextrestored", this.#onContextRestored);
+    map
+      .toggleCustomLayer(this)
+      .on("preclick", this.#onClick)
+      .on("mousemove", this.#onMouseMove)
+      .on("contextlost", this.#onContextLost)
+      .on("contextrestored", this.#onContextRestored);
     map.frameEvents.on("draw", this.#onDraw);
   }
 
   #dispose(): void {
     const map = this.#map;
-    map.toggleCustomLayer(this, false).off("preclick", this.#onClick).off("mousemove", this.#onMouseMove).off("contextlost", this.#onContextLost).off("contextrestored", this.#onContextRestored);
+    map
+      .toggleCustomLayer(this, false)
+      .off("preclick", this.#onClick)
+      .off("mousemove", this.#onMouseMove)
+      .off("contextlost", this.#onContextLost)
+      .off("contextrestored", this.#onContextRestored);
     map.frameEvents.off("draw", this.#onDraw);
     map.container.classList.remove("map3d-over-model");
     this.#composite?.free();
@@ -127,7 +142,9 @@ export class ModelRenderer implements CustomLayer {
   render(_gl: WebGL2RenderingContext, state: FrameState, soft: boolean): void {
     const [rect, target] = [this.#rect, this.#target];
     if (!rect || !target?.depthTexture) return;
-    const [color, depth] = [target.texture, target.depthTexture].map((texture) => (this.#renderer.properties.get(texture) as { __webglTexture?: WebGLTexture }).__webglTexture);
+    const [color, depth] = [target.texture, target.depthTexture].map(
+      (texture) => (this.#renderer.properties.get(texture) as { __webglTexture?: WebGLTexture }).__webglTexture,
+    );
     if (color && depth) this.#composite?.draw(color, depth, rect, state, soft);
   }
 
@@ -139,7 +156,11 @@ export class ModelRenderer implements CustomLayer {
   #targetOf({ width, height }: ScreenRect): ThreeTarget {
     if (this.#target?.width === width && this.#target.height === height) return this.#target;
     this.#target?.dispose();
-    return new this.#three.WebGLRenderTarget(width, height, { samples: SAMPLES, colorSpace: "srgb", depthTexture: new this.#three.DepthTexture(width, height) as never });
+    return new this.#three.WebGLRenderTarget(width, height, {
+      samples: SAMPLES,
+      colorSpace: "srgb",
+      depthTexture: new this.#three.DepthTexture(width, height) as never,
+    });
   }
 
   /** Places the camera at the centre of what it sees, which keeps coordinates on the GPU small. */
@@ -148,7 +169,15 @@ export class ModelRenderer implements CustomLayer {
     const [left, top, px] = screenRectCorner(rect, state);
     const [w, h, d] = [rect.width * px, rect.height * px, (near + far) / 2];
     const [x, y, z] = localFromUvd(state.camera.frame.axes, [left + w / 2, top - h / 2, d]);
-    Object.assign(this.#camera, { left: -w / 2, right: w / 2, top: h / 2, bottom: -h / 2, near: near - d, far: far - d, matrixWorldNeedsUpdate: true });
+    Object.assign(this.#camera, {
+      left: -w / 2,
+      right: w / 2,
+      top: h / 2,
+      bottom: -h / 2,
+      near: near - d,
+      far: far - d,
+      matrixWorldNeedsUpdate: true,
+    });
     this.#camera.matrix.set(right[0], up[0], -forward[0], x, right[1], up[1], -forward[1], y, right[2], up[2], -forward[2], z, 0, 0, 0, 1);
     this.#camera.updateProjectionMatrix();
   }

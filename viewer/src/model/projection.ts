@@ -36,8 +36,14 @@ export function screenRectOf(boxes: readonly Box3[], { camera, width, height, dp
   const px = cssPixelM(camera) / dpr;
   const points = boxes.flatMap((box) => corners(box).map((corner) => uvdFromLocal(camera.frame.axes, corner)));
   const [left, top] = cornerOf(camera);
-  const across = spanOf(points.map(([u]) => (u - left) / px), width);
-  const down = spanOf(points.map(([, v]) => (top - v) / px), height);
+  const across = spanOf(
+    points.map(([u]) => (u - left) / px),
+    width,
+  );
+  const down = spanOf(
+    points.map(([, v]) => (top - v) / px),
+    height,
+  );
   return across && down && { x: across[0], width: across[1], y: down[0], height: down[1] };
 }
 
@@ -76,5 +82,11 @@ export interface ThreeLighting {
 /** Converts the map's light. An unlit map shows stored colours, which uniform white light reproduces. */
 export function threeLighting(light: Readonly<Light>): ThreeLighting {
   const { lit, sky_rgb, sun_rgb, ambient, diffuse } = light;
-  return { sky_rgb: lit ? sky_rgb : [1, 1, 1], sky: Math.PI * (lit ? ambient : 1), sun_rgb, sun: lit ? Math.PI * diffuse : 0, towards: towardsLight(light) };
+  return {
+    sky_rgb: lit ? sky_rgb : [1, 1, 1],
+    sky: Math.PI * (lit ? ambient : 1),
+    sun_rgb,
+    sun: lit ? Math.PI * diffuse : 0,
+    towards: towardsLight(light),
+  };
 }

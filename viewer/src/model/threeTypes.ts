@@ -4,7 +4,11 @@ export interface Three {
   readonly LoopOnce: number;
   readonly LoopRepeat: number;
   readonly WebGLRenderer: new (options: { canvas: HTMLCanvasElement; context: WebGL2RenderingContext }) => ThreeRenderer;
-  readonly WebGLRenderTarget: new (width: number, height: number, options: { samples: number; colorSpace: "srgb"; depthTexture: never }) => ThreeTarget;
+  readonly WebGLRenderTarget: new (
+    width: number,
+    height: number,
+    options: { samples: number; colorSpace: "srgb"; depthTexture: never },
+  ) => ThreeTarget;
   readonly DepthTexture: new (width: number, height: number) => object;
   readonly Scene: new () => ThreeNode;
   readonly Group: new () => ThreeNode;
@@ -58,7 +62,28 @@ export interface ThreeCamera extends ThreeNode {
   near: number;
   far: number;
   matrixAutoUpdate: boolean;
-  readonly matrix: { set(...rows: readonly [number, number, number, number, number, number, number, number, number, number, number, number, number, number, number, number]): unknown };
+  readonly matrix: {
+    set(
+      ...rows: readonly [
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+        number,
+      ]
+    ): unknown;
+  };
   updateProjectionMatrix(): void;
 }
 

@@ -31,16 +31,25 @@ const OPTIONAL_LAYERS = ["depth2", "picture"];
 /** Fills in the defaults. @throws UsageError when the map is not ready, or for unknown layers and directions */
 export async function resolveOptions(shown: map, { bounds, levels, layers, directions, objects = true }: AreaOptions): Promise<FilledArea> {
   const renderings = shown.layers.flatMap(({ rendering }) => rendering ?? []);
-  if (renderings.length === 0) throw new UsageError("the map is not ready; wait for its event \"ready\"");
-  const known = { layers: unique(renderings.flatMap(({ json }) => json.layers.map(({ name }) => name))), directions: unique(renderings.flatMap(({ views }) => [...views.keys()])) };
-  for (const [what, list] of [["layers", layers], ["directions", directions]] as const) {
+  if (renderings.length === 0) throw new UsageError('the map is not ready; wait for its event "ready"');
+  const known = {
+    layers: unique(renderings.flatMap(({ json }) => json.layers.map(({ name }) => name))),
+    directions: unique(renderings.flatMap(({ views }) => [...views.keys()])),
+  };
+  for (const [what, list] of [
+    ["layers", layers],
+    ["directions", directions],
+  ] as const) {
     const unknown = list?.find((name) => !known[what].includes(name));
     if (unknown !== undefined) throw new UsageError(`unknown ${what.slice(0, -1)} "${unknown}"; the map has ${known[what].join(", ")}`);
   }
   const [least, greatest] = levels ?? [0, DEEPEST_LEVEL];
-  if (!(least >= 0 && least <= greatest)) throw new UsageError(`levels must be a range from 0 upwards, got ${String(least)} to ${String(greatest)}`);
+  if (!(least >= 0 && least <= greatest))
+    throw new UsageError(`levels must be a range from 0 upwards, got ${String(least)} to ${String(greatest)}`);
   return {
-    bounds: bounds ?? await boundsInView(shown, renderings, directions ?? known.directions), objects, directions: directions ?? known.directions,
+    bounds: bounds ?? (await boundsInView(shown, renderings, directions ?? known.directions)),
+    objects,
+    directions: directions ?? known.directions,
     levels: [least, Math.min(greatest, Math.max(...renderings.map(({ json }) => json.zmax)))],
     layers: layers ?? known.layers.filter((name) => !OPTIONAL_LAYERS.includes(name)),
   };
@@ -48,24 +57,42 @@ export async function resolveOptions(shown: map, { bounds, levels, layers, direc
 
 /** Returns the box above the ground that is in view when each direction looks at the centre of the screen: at the surface there, or at the ground if it is not known. */
 async function boundsInView(shown: map, renderings: readonly Rendering[], directions: readonly string[]): Promise<Box3> {
-  const { metresPerPixel: px_m, container: { clientWidth, clientHeight } } = shown;
+  const {
+    metresPerPixel: px_m,
+    container: { clientWidth, clientHeight },
+  } = shown;
   const middle = [clientWidth / 2, clientHeight / 2] as const;
   const centers = [shown.unproject(middle), (await shown.pick(middle)).position].filter((at) => at !== null);
   const found = renderings.flatMap(({ json: { origin, box }, views }) => {
     const bottom = box[0][2];
-    const ground = [...views.values()].filter(({ id }) => directions.includes(id)).flatMap(({ frame: { axes } }) => centers.flatMap((center) => {
-      const [u, v] = uvdFromLocal(axes, sub(center, origin));
-      return ([[-1, -1], [-1, 1], [1, -1], [1, 1]] as const).flatMap(([x, y]) => {
-        const at = [u + (x * clientWidth * px_m) / 2, v + (y * clientHeight * px_m) / 2] as const;
-        const depth = depthAtHeight(axes, at[1], bottom);
-        return depth === null ? [] : [localFromUvd(axes, [...at, depth])];
-      });
-    }));
+    const ground = [...views.values()]
+      .filter(({ id }) => directions.includes(id))
+      .flatMap(({ frame: { axes } }) =>
+        centers.flatMap((center) => {
+          const [u, v] = uvdFromLocal(axes, sub(center, origin));
+          return (
+            [
+              [-1, -1],
+              [-1, 1],
+              [1, -1],
+              [1, 1],
+            ] as const
+          ).flatMap(([x, y]) => {
+            const at = [u + (x * clientWidth * px_m) / 2, v + (y * clientHeight * px_m) / 2] as const;
+            const depth = depthAtHeight(axes, at[1], bottom);
+            return depth === null ? [] : [localFromUvd(axes, [...at, depth])];
+          });
+        }),
+      );
     // In horizontal views the visible ground is unlimited.
     const area: readonly Vec3[] = ground.length === 0 ? box : ground;
     return area.flatMap(([x, y]) => box.map(([, , z]) => add(origin, [x, y, z])));
   });
-  const extreme = (of: (...parts: number[]) => number): Vec3 => [of(...found.map((at) => at[0])), of(...found.map((at) => at[1])), of(...found.map((at) => at[2]))];
+  const extreme = (of: (...parts: number[]) => number): Vec3 => [
+    of(...found.map((at) => at[0])),
+    of(...found.map((at) => at[1])),
+    of(...found.map((at) => at[2])),
+  ];
   return [extreme(Math.min), extreme(Math.max)];
 }
 
@@ -78,9 +105,16 @@ export interface PlannedTile {
 
 /** Yields all occupied tiles of a rendering in an area. */
 export function* tilesOf(rendering: Rendering, { bounds, levels, layers, directions }: FilledArea): Generator<PlannedTile> {
-  const { json: { origin, box, layers: infos }, views } = rendering;
-  const local = bounds.map((corner) => sub(corner, origin).map((part, k) => clamp(part, box[0][k] ?? 0, box[1][k] ?? 0))) as unknown as Box3;
-  const outside = [0, 1].some((k) => (bounds[1][k] ?? 0) - (origin[k] ?? 0) < (box[0][k] ?? 0) || (bounds[0][k] ?? 0) - (origin[k] ?? 0) > (box[1][k] ?? 0));
+  const {
+    json: { origin, box, layers: infos },
+    views,
+  } = rendering;
+  const local = bounds.map((corner) =>
+    sub(corner, origin).map((part, k) => clamp(part, box[0][k] ?? 0, box[1][k] ?? 0)),
+  ) as unknown as Box3;
+  const outside = [0, 1].some(
+    (k) => (bounds[1][k] ?? 0) - (origin[k] ?? 0) < (box[0][k] ?? 0) || (bounds[0][k] ?? 0) - (origin[k] ?? 0) > (box[1][k] ?? 0),
+  );
   if (outside) return;
   for (const view of views.values()) {
     if (!directions.includes(view.id)) continue;
@@ -90,11 +124,20 @@ export function* tilesOf(rendering: Rendering, { bounds, levels, layers, directi
 }
 
 /** Yields the occupied tiles that overlap a rectangle, and all of the first levels; each tile before its children. */
-export function* tilesIn({ frame, occupancy }: Pick<View, "frame" | "occupancy">, [low, high]: UvRect, [least, greatest]: readonly [number, number], tile: Tile = { z: 0, x: 0, y: 0 }): Generator<Tile> {
+export function* tilesIn(
+  { frame, occupancy }: Pick<View, "frame" | "occupancy">,
+  [low, high]: UvRect,
+  [least, greatest]: readonly [number, number],
+  tile: Tile = { z: 0, x: 0, y: 0 },
+): Generator<Tile> {
   if (tile.z > greatest || !occupancy.has(tile)) return;
   const tile_m = frame.size / 2 ** tile.z;
   const overlaps = (at: number, from: number, to: number): boolean => at >= Math.floor(from / tile_m) && at < Math.ceil(to / tile_m);
-  if (tile.z > LAST_COMPLETE_LEVEL && !(overlaps(tile.x, low[0] - frame.u0, high[0] - frame.u0) && overlaps(tile.y, frame.v0 - high[1], frame.v0 - low[1]))) return;
+  if (
+    tile.z > LAST_COMPLETE_LEVEL &&
+    !(overlaps(tile.x, low[0] - frame.u0, high[0] - frame.u0) && overlaps(tile.y, frame.v0 - high[1], frame.v0 - low[1]))
+  )
+    return;
   if (tile.z >= least) yield tile;
   for (const child of childrenOf(tile)) yield* tilesIn({ frame, occupancy }, [low, high], [least, greatest], child);
 }

@@ -17,7 +17,8 @@ export interface StoredArea extends FilledArea {
 
 /** Returns the Cache Storage of this site. @throws StorageError where it is not available */
 export function storage(): CacheStorage {
-  if (!("caches" in globalThis)) throw new StorageError("offline storage is not available; the page must be served over https or from localhost");
+  if (!("caches" in globalThis))
+    throw new StorageError("offline storage is not available; the page must be served over https or from localhost");
   return caches;
 }
 

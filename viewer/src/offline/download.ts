@@ -1,5 +1,15 @@
 import { asError } from "../core/errors";
-import { FetchError, HttpSource, UsageError, type AttributeInfo, type map, type Rendering, type Tile, type View, type LayerInfo } from "../map3d";
+import {
+  FetchError,
+  HttpSource,
+  UsageError,
+  type AttributeInfo,
+  type map,
+  type Rendering,
+  type Tile,
+  type View,
+  type LayerInfo,
+} from "../map3d";
 import { readArea, storage, writeArea, type StoredArea } from "./areas";
 import { CACHE, RECORD } from "./cacheKeys";
 import { OfflineCache, StorageError } from "./offlineCache";
@@ -59,18 +69,33 @@ export async function downloadArea(shown: map, options: DownloadOptions = {}): P
   const { name = "area", concurrency = 6, onProgress, signal } = options;
   const area = await resolveOptions(shown, options);
   const ending = new AbortController();
-  const stop = (): void => { ending.abort(signal?.reason); };
+  const stop = (): void => {
+    ending.abort(signal?.reason);
+  };
   signal?.throwIfAborted();
   signal?.addEventListener("abort", stop);
   try {
     const store = await storage().open(CACHE + name);
-    const cache = new OfflineCache(store, (error) => { ending.abort(error); });
+    const cache = new OfflineCache(store, (error) => {
+      ending.abort(error);
+    });
     const renderings = await openRenderings(shown, cache);
     const before = await readArea(name);
     const { tiles, bytes, free_bytes } = await estimate(renderings, area);
     void navigator.storage.persist();
-    if (free_bytes !== null && bytes - (before?.bytes ?? 0) > free_bytes) throw new StorageError(`not enough storage: the area needs about ${megabytes(bytes)}, ${megabytes(free_bytes)} are available; save a smaller area or delete another one`);
-    const record: StoredArea = { ...area, name, title: renderings.map(({ rendering: { json } }) => json.title || json.name).join(", "), tiles, bytes, complete: false, stored: new Date().toISOString() };
+    if (free_bytes !== null && bytes - (before?.bytes ?? 0) > free_bytes)
+      throw new StorageError(
+        `not enough storage: the area needs about ${megabytes(bytes)}, ${megabytes(free_bytes)} are available; save a smaller area or delete another one`,
+      );
+    const record: StoredArea = {
+      ...area,
+      name,
+      title: renderings.map(({ rendering: { json } }) => json.title || json.name).join(", "),
+      tiles,
+      bytes,
+      complete: false,
+      stored: new Date().toISOString(),
+    };
     if (before?.complete !== true) await writeArea(store, record);
     const shards = new ShardCollector(shown, area, renderings);
     let done = 0;
@@ -95,11 +120,16 @@ export async function downloadArea(shown: map, options: DownloadOptions = {}): P
 
 /** Opens the map's renderings and reads their current manifests. */
 async function openRenderings(shown: map, cache?: OfflineCache): Promise<OfflineRendering[]> {
-  return Promise.all(shown.layers.filter(({ rendering }) => rendering).map(async ({ source: original }) => {
-    if (!(original instanceof HttpSource)) throw new UsageError("only renderings from URLs can be saved; this layer has another source");
-    const source = new HttpSource(original.bases, cache?.fetch);
-    return { source, rendering: await source.manifest() };
-  }));
+  return Promise.all(
+    shown.layers
+      .filter(({ rendering }) => rendering)
+      .map(async ({ source: original }) => {
+        if (!(original instanceof HttpSource))
+          throw new UsageError("only renderings from URLs can be saved; this layer has another source");
+        const source = new HttpSource(original.bases, cache?.fetch);
+        return { source, rendering: await source.manifest() };
+      }),
+  );
 }
 
 function* allTiles(renderings: readonly OfflineRendering[], area: FilledArea): Generator<PlannedTile & OfflineRendering> {
@@ -119,7 +149,9 @@ async function estimate(renderings: readonly OfflineRendering[], area: FilledAre
   }
   let [tiles, bytes] = [0, 0];
   for (const { count, sample } of groups.values()) {
-    const sizes = await Promise.all(sample.map(async ({ source, view, layer, tile }) => (await source.tile(view, layer, tile))?.byteLength ?? 0));
+    const sizes = await Promise.all(
+      sample.map(async ({ source, view, layer, tile }) => (await source.tile(view, layer, tile))?.byteLength ?? 0),
+    );
     tiles += count;
     bytes += (count * sizes.reduce((sum, size) => sum + size, 0)) / sizes.length;
   }
@@ -131,14 +163,16 @@ async function estimate(renderings: readonly OfflineRendering[], area: FilledAre
 /** Runs a task for each item, several in parallel; the first failure ends all. */
 async function runParallel<T>(items: Iterator<T>, concurrency: number, run: (item: T) => Promise<void>): Promise<void> {
   let failed = false;
-  await Promise.all(Array.from({ length: concurrency }, async () => {
-    for (let next = items.next(); !failed && next.done !== true; next = items.next()) {
-      await run(next.value).catch((reason: unknown) => {
-        failed = true;
-        throw reason;
-      });
-    }
-  }));
+  await Promise.all(
+    Array.from({ length: concurrency }, async () => {
+      for (let next = items.next(); !failed && next.done !== true; next = items.next()) {
+        await run(next.value).catch((reason: unknown) => {
+          failed = true;
+          throw reason;
+        });
+      }
+    }),
+  );
 }
 
 /** Collects the attribute shards of the objects in the tiles of the deepest level. */
@@ -152,7 +186,10 @@ class ShardCollector {
     for (const { rendering } of renderings) this.#shards.set(rendering, new Set());
   }
 
-  async add({ rendering, layer, tile }: { rendering: Rendering; layer: LayerInfo; tile: Tile; view: View }, bytes: ArrayBuffer): Promise<void> {
+  async add(
+    { rendering, layer, tile }: { rendering: Rendering; layer: LayerInfo; tile: Tile; view: View },
+    bytes: ArrayBuffer,
+  ): Promise<void> {
     const { objects, zmax } = rendering.json;
     if (!objects || (layer.kind !== "id" && layer.kind !== "data") || tile.z !== Math.min(this.#last, zmax)) return;
     const data = await this.#shown.layerContext?.tileResources.decoder.decode("id", layer.media_type, bytes);
@@ -175,14 +212,18 @@ async function saveObjects(renderings: readonly OfflineRendering[], collector: S
   for (const { source, rendering } of renderings) {
     const { objects } = rendering.json;
     if (!objects) continue;
-    const list = objects.attributes === undefined ? null : ((await source.json(objects.attributes)) as { attributes?: readonly AttributeInfo[] } | null);
+    const list =
+      objects.attributes === undefined
+        ? null
+        : ((await source.json(objects.attributes)) as { attributes?: readonly AttributeInfo[] } | null);
     const columns = (list?.attributes ?? []).flatMap(({ column }) => objects.columns?.replace("{column}", column) ?? []);
     const numbers = [...collector.shardsOf(rendering)];
     const shards = numbers.map((shard) => objects.shards.replace("{shard}", String(shard)));
     const save = async (path: string): Promise<void> => {
       const file = (await source.json(path)) as { pages?: readonly string[]; shards?: readonly number[]; shard_size?: number } | null;
       const wanted = new Set(numbers.map((shard) => Math.floor((shard * objects.shard_size) / (file?.shard_size ?? 1))));
-      for (const name of file?.pages ?? file?.shards?.filter((shard) => wanted.has(shard)) ?? []) await save(path.replace(/\.json$/, `/${String(name)}.json`));
+      for (const name of file?.pages ?? file?.shards?.filter((shard) => wanted.has(shard)) ?? [])
+        await save(path.replace(/\.json$/, `/${String(name)}.json`));
     };
     await runParallel([...(objects.search === undefined ? [] : [objects.search]), ...columns, ...shards].values(), concurrency, save);
   }
@@ -190,8 +231,13 @@ async function saveObjects(renderings: readonly OfflineRendering[], collector: S
 
 /** Returns the URLs of the page and of the files that it has loaded from its own host. */
 function pageFiles(): string[] {
-  const loaded = performance.getEntriesByType("resource").filter((entry) => !["fetch", "xmlhttprequest", "beacon"].includes((entry as PerformanceResourceTiming).initiatorType)).map(({ name }) => name);
-  return [...new Set([location.href, ...loaded].map((url) => url.replace(/#.*$/, "")))].filter((url) => url.startsWith(`${location.origin}/`));
+  const loaded = performance
+    .getEntriesByType("resource")
+    .filter((entry) => !["fetch", "xmlhttprequest", "beacon"].includes((entry as PerformanceResourceTiming).initiatorType))
+    .map(({ name }) => name);
+  return [...new Set([location.href, ...loaded].map((url) => url.replace(/#.*$/, "")))].filter((url) =>
+    url.startsWith(`${location.origin}/`),
+  );
 }
 
 async function saveFile(cache: OfflineCache, file: string, signal: AbortSignal): Promise<void> {

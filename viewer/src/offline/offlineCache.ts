@@ -38,7 +38,9 @@ export class OfflineCache {
     const response = await globalThis.fetch(url, isVersioned(url) ? init : { ...init, cache: "reload" });
     if (range !== undefined && response.status === 206) this.#tags.set(url, tagOf(response.headers));
     const whole = range === undefined || response.status === 206;
-    return response.ok && whole && !(response.headers.get("cache-control") ?? "").includes("no-store") ? this.#store(key, response) : response;
+    return response.ok && whole && !(response.headers.get("cache-control") ?? "").includes("no-store")
+      ? this.#store(key, response)
+      : response;
   };
 
   /** Fetches and stores a page or one of its files. @returns the response of the host */
@@ -51,7 +53,8 @@ export class OfflineCache {
   /** Stores the deferred files and deletes files that this run did not use. */
   async commit(keep: readonly string[]): Promise<void> {
     for (const [key, response] of this.#deferred) await this.#put(key, response);
-    for (const request of await this.#cache.keys()) if (!this.#used.has(request.url) && !keep.includes(request.url)) await this.#cache.delete(request);
+    for (const request of await this.#cache.keys())
+      if (!this.#used.has(request.url) && !keep.includes(request.url)) await this.#cache.delete(request);
   }
 
   #same(url: string, cached: Response): boolean {
@@ -82,7 +85,9 @@ export class OfflineCache {
     try {
       await this.#cache.put(key, response);
     } catch (reason) {
-      const error = new StorageError(`storage is full: could not save ${key} (${reason instanceof Error ? reason.name : String(reason)}); save a smaller area or delete another one`);
+      const error = new StorageError(
+        `storage is full: could not save ${key} (${reason instanceof Error ? reason.name : String(reason)}); save a smaller area or delete another one`,
+      );
       this.#onFailure(error);
       throw error;
     }

@@ -12,7 +12,8 @@ export async function registerWorker(url = "map3d-worker.js"): Promise<ServiceWo
   if (!isOfflineAvailable()) throw new StorageError("offline use is not available; the page must be served over https or from localhost");
   try {
     const { scope } = await navigator.serviceWorker.register(new URL(url, document.baseURI));
-    if (!location.href.startsWith(scope)) throw new StorageError(`its scope is ${scope}, which does not contain this page; put it into the page's folder or above`);
+    if (!location.href.startsWith(scope))
+      throw new StorageError(`its scope is ${scope}, which does not contain this page; put it into the page's folder or above`);
     return await navigator.serviceWorker.ready;
   } catch (reason) {
     throw new StorageError(`cannot register ${url}: ${asError(reason).message}`);

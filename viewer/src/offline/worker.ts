@@ -26,8 +26,12 @@ const tags = new Map<string, string>();
 let cacheFirstUntil = 0;
 let cacheList: { readonly until: number; readonly names: Promise<string[]> } | undefined;
 
-scope.addEventListener("install", (event) => { event.waitUntil(scope.skipWaiting()); });
-scope.addEventListener("activate", (event) => { event.waitUntil(scope.clients.claim()); });
+scope.addEventListener("install", (event) => {
+  event.waitUntil(scope.skipWaiting());
+});
+scope.addEventListener("activate", (event) => {
+  event.waitUntil(scope.clients.claim());
+});
 scope.addEventListener("fetch", (event) => {
   const { request } = event;
   if (request.method === "GET" && request.url.startsWith("http") && request.cache !== "only-if-cached") event.respondWith(respond(request));
@@ -62,7 +66,11 @@ async function networkFirst(request: Request, find: () => Promise<Response | und
   }
   const pending = fetch(request);
   let timer: ReturnType<typeof setTimeout> | undefined;
-  const timeout = new Promise<null>((resolve) => { timer = setTimeout(() => { resolve(null); }, TIMEOUT_MS); });
+  const timeout = new Promise<null>((resolve) => {
+    timer = setTimeout(() => {
+      resolve(null);
+    }, TIMEOUT_MS);
+  });
   const response = await Promise.race([pending, timeout]).catch(() => null);
   clearTimeout(timer);
   if (response && response.status < 500) return response;
@@ -90,11 +98,16 @@ function listCaches(): Promise<string[]> {
 
 async function sortedCaches(): Promise<string[]> {
   const names = (await caches.keys()).filter((name) => name.startsWith(CACHE));
-  const times = await Promise.all(names.map(async (name) => {
-    const record = await caches.match(RECORD, { cacheName: name });
-    return record ? ((await record.json()) as { stored: string }).stored : "";
-  }));
-  return names.map((name, k) => ({ name, time: times[k] ?? "" })).sort((a, b) => (a.time < b.time ? 1 : -1)).map(({ name }) => name);
+  const times = await Promise.all(
+    names.map(async (name) => {
+      const record = await caches.match(RECORD, { cacheName: name });
+      return record ? ((await record.json()) as { stored: string }).stored : "";
+    }),
+  );
+  return names
+    .map((name, k) => ({ name, time: times[k] ?? "" }))
+    .sort((a, b) => (a.time < b.time ? 1 : -1))
+    .map(({ name }) => name);
 }
 
 const withoutHash = (url: string): string => url.replace(/#.*$/, "");

@@ -1,4 +1,5 @@
-const listCanvases = (element: HTMLElement): HTMLCanvasElement[] => (element instanceof HTMLCanvasElement ? [element] : [...element.querySelectorAll("canvas")]);
+const listCanvases = (element: HTMLElement): HTMLCanvasElement[] =>
+  element instanceof HTMLCanvasElement ? [element] : [...element.querySelectorAll("canvas")];
 
 /** Longest wait for the other view. */
 const MAX_WAIT_MS = 2500;
@@ -21,7 +22,9 @@ export function fadeOut(element: HTMLElement, duration_ms: number, waits: () => 
       return;
     }
     copy.style.opacity = "0";
-    setTimeout(() => { copy.remove(); }, duration_ms + 100);
+    setTimeout(() => {
+      copy.remove();
+    }, duration_ms + 100);
   };
   requestAnimationFrame(() => requestAnimationFrame(fade));
 }

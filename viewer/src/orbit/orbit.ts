@@ -122,7 +122,11 @@ export class orbit extends MapLayer<map, object> implements ViewTransition {
     this.#gesture = null;
     if (!transition) return;
     const to = map.lookAt_deg;
-    if (Math.abs(angleBetween(transition.current.lookAt, transition.from.frame.lookAtDeg)) < Math.abs(angleBetween(transition.current.lookAt, to))) map.setDirection(transition.from.frame.id);
+    if (
+      Math.abs(angleBetween(transition.current.lookAt, transition.from.frame.lookAtDeg)) <
+      Math.abs(angleBetween(transition.current.lookAt, to))
+    )
+      map.setDirection(transition.from.frame.id);
     else this.#transition = { ...transition, start: transition.current, start_ms: performance.now() };
   }
 
@@ -136,7 +140,10 @@ export class orbit extends MapLayer<map, object> implements ViewTransition {
       const duration_ms = clamp(this.#duration_ms * (0.35 + (0.65 * angle_deg) / 90), 1, 2 * this.#duration_ms);
       const share = clamp((now_ms - (transition.start_ms ?? now_ms)) / duration_ms, 0, 1);
       const eased = share * share * (3 - 2 * share);
-      transition.current = { lookAt: transition.start.lookAt + angleBetween(transition.start.lookAt, target.lookAt) * eased, pitch: transition.start.pitch + (target.pitch - transition.start.pitch) * eased };
+      transition.current = {
+        lookAt: transition.start.lookAt + angleBetween(transition.start.lookAt, target.lookAt) * eased,
+        pitch: transition.start.pitch + (target.pitch - transition.start.pitch) * eased,
+      };
       if (share === 1) transition.ended_ms ??= now_ms;
     }
     if (transition.ended_ms !== null && (transition.complete || now_ms - transition.ended_ms > MAX_WAIT_MS)) {
@@ -154,15 +161,28 @@ export class orbit extends MapLayer<map, object> implements ViewTransition {
     if (this.#warp?.gl !== gl) this.#free();
     const warp = (this.#warp ??= this.#createWarp(gl));
     transition.complete = frame.complete;
-    transition.images ??= [renderRgbd(frame, warp, transition.from, camera.frame, null), renderRgbd(frame, warp, camera, transition.from.frame, null)];
+    transition.images ??= [
+      renderRgbd(frame, warp, transition.from, camera.frame, null),
+      renderRgbd(frame, warp, camera, transition.from.frame, null),
+    ];
     const second = transition.images[1];
-    if (frame.tilesChanged || hasMoved(second.source, camera)) transition.images[1] = renderRgbd(frame, warp, camera, transition.from.frame, second);
+    if (frame.tilesChanged || hasMoved(second.source, camera))
+      transition.images[1] = renderRgbd(frame, warp, camera, transition.from.frame, second);
     const intermediate = intermediateCamera(camera, transition);
-    const [a, b] = [angularDistance(transition.current, anglesOf(transition.from.frame)), angularDistance(transition.current, anglesOf(camera.frame))];
+    const [a, b] = [
+      angularDistance(transition.current, anglesOf(transition.from.frame)),
+      angularDistance(transition.current, anglesOf(camera.frame)),
+    ];
     const share = a + b > 0 ? a / (a + b) : 1;
     const size = limitSize(frame.width, frame.height);
     transition.start_ms ??= performance.now();
-    warp.draw(transition.images, { camera: intermediate, pivot: transition.pivot, range: frame.getDepthRange(intermediate.frame) }, share * share * (3 - 2 * share), frame, size);
+    warp.draw(
+      transition.images,
+      { camera: intermediate, pivot: transition.pivot, range: frame.getDepthRange(intermediate.frame) },
+      share * share * (3 - 2 * share),
+      frame,
+      size,
+    );
   }
 
   /** @throws DrawError; the view then changes at once */
@@ -192,10 +212,16 @@ function intermediateCamera(camera: Camera, { current, pivot }: Pick<TransitionS
   const axes = computeAxes(current.lookAt, current.pitch);
   const [u, v] = uvdFromLocal(camera.frame.axes, pivot);
   const [turnedU, turnedV] = uvdFromLocal(axes, pivot);
-  return { ...camera, frame: { ...camera.frame, axes, lookAtDeg: current.lookAt, pitchDeg: current.pitch }, u: turnedU + camera.u - u, v: turnedV + camera.v - v };
+  return {
+    ...camera,
+    frame: { ...camera.frame, axes, lookAtDeg: current.lookAt, pitchDeg: current.pitch },
+    u: turnedU + camera.u - u,
+    v: turnedV + camera.v - v,
+  };
 }
 
-const hasMoved = (a: Camera, b: Camera): boolean => (["u", "v", "zoom", "frame", "width", "height"] as const).some((part) => a[part] !== b[part]);
+const hasMoved = (a: Camera, b: Camera): boolean =>
+  (["u", "v", "zoom", "frame", "width", "height"] as const).some((part) => a[part] !== b[part]);
 
 /** Renders what a camera sees, enlarged to what becomes visible half-way to another frame. @param into image whose target is reused */
 function renderRgbd(frame: TransitionFrame, warp: Warp, camera: Camera, other: Frame, into: RgbdImage | null): RgbdImage {
@@ -213,7 +239,10 @@ function sweptSize({ frame, width, height }: Camera, other: Frame): Vec2 {
   const half = (Math.abs(angleBetween(frame.lookAtDeg, other.lookAtDeg)) / 2) * (Math.PI / 180);
   const flat = Math.max(0.3, Math.sin((frame.pitchDeg * Math.PI) / 180));
   const [along, across] = [Math.abs(Math.cos(half)), Math.abs(Math.sin(half))];
-  return [MARGIN_FACTOR * Math.max(width, width * along + (height * across) / flat), MARGIN_FACTOR * Math.max(height, height * along + width * across * flat)];
+  return [
+    MARGIN_FACTOR * Math.max(width, width * along + (height * across) / flat),
+    MARGIN_FACTOR * Math.max(height, height * along + width * across * flat),
+  ];
 }
 
 /** Limits a size to `MAX_PX` pixels; keeps the aspect ratio. */

@@ -68,7 +68,13 @@ export class Warp {
   }
 
   /** Draws the blend of two images, as seen by another camera. @param fraction weight of the second image  @param canvas size in device pixels  @param size size of the warped images */
-  draw(images: readonly [RgbdImage, RgbdImage], view: WarpView, fraction: number, canvas: { width: number; height: number }, size: Vec2): void {
+  draw(
+    images: readonly [RgbdImage, RgbdImage],
+    view: WarpView,
+    fraction: number,
+    canvas: { width: number; height: number },
+    size: Vec2,
+  ): void {
     const gl = this.#gl;
     const warped = (this.#warped ??= [this.createTarget(...size), this.createTarget(...size)]);
     gl.disable(gl.BLEND);
@@ -77,14 +83,19 @@ export class Warp {
     gl.depthFunc(gl.LEQUAL);
     gl.depthMask(true);
     gl.useProgram(this.#warp);
-    images.forEach((image, k) => { this.#warpImage(image, view, warped[k as 0 | 1]); });
+    images.forEach((image, k) => {
+      this.#warpImage(image, view, warped[k as 0 | 1]);
+    });
     gl.disable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.useProgram(this.#mix);
     this.#bind(this.#mix, { u_colorA: warped[0].color, u_colorB: warped[1].color, u_depthA: warped[0].depth, u_depthB: warped[1].depth });
     gl.uniform1f(this.#at(this.#mix, "u_share"), fraction);
-    gl.uniform1f(this.#at(this.#mix, "u_tie"), (0.5 * TIE_PX * Math.max(...images.map(({ camera }) => cssPixelM(camera)))) / (view.range[1] - view.range[0]));
+    gl.uniform1f(
+      this.#at(this.#mix, "u_tie"),
+      (0.5 * TIE_PX * Math.max(...images.map(({ camera }) => cssPixelM(camera)))) / (view.range[1] - view.range[0]),
+    );
     gl.uniform2f(this.#at(this.#mix, "u_pixel"), 1 / canvas.width, 1 / canvas.height);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     this.#bind(this.#mix, { u_colorA: null, u_colorB: null, u_depthA: null, u_depthB: null });

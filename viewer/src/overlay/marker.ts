@@ -142,11 +142,27 @@ export class marker extends PositionedLayer<MarkerEvents> {
 
   #createButton(map: OverlayHost): HTMLButtonElement {
     const { color, icon, showLabel, draggable } = this.options;
-    const button = element("button", "map3d-marker", { type: "button" }, icon === undefined ? element("span", "map3d-marker-stem") : element("span", "map3d-marker-icon", {}, icon), element("span", "map3d-marker-label"));
+    const button = element(
+      "button",
+      "map3d-marker",
+      { type: "button" },
+      icon === undefined ? element("span", "map3d-marker-stem") : element("span", "map3d-marker-icon", {}, icon),
+      element("span", "map3d-marker-label"),
+    );
     button.classList.toggle("map3d-marker-hover-label", !showLabel);
     if (color !== undefined) button.style.setProperty("--map3d-marker", color);
-    button.addEventListener("click", () => { this.#onClick(); });
-    if (draggable) (getFeature("drag", "draggable") as EnableDragging)(button, map, () => this.position, (type, position) => { this.#onDrag(type, position); });
+    button.addEventListener("click", () => {
+      this.#onClick();
+    });
+    if (draggable)
+      (getFeature("drag", "draggable") as EnableDragging)(
+        button,
+        map,
+        () => this.position,
+        (type, position) => {
+          this.#onDrag(type, position);
+        },
+      );
     return button;
   }
 

@@ -78,7 +78,8 @@ export class popup extends PositionedLayer<PopupEvents> {
   protected placeElement(map: OverlayHost, position: Vec3 | null): void {
     const at = position && map.project(position);
     this.#box.hidden = !at;
-    if (at) this.#box.style.transform = `translate(${at[0].toFixed(1)}px, ${(at[1] - this.options.offset_px).toFixed(1)}px) translate(-50%, -100%)`;
+    if (at)
+      this.#box.style.transform = `translate(${at[0].toFixed(1)}px, ${(at[1] - this.options.offset_px).toFixed(1)}px) translate(-50%, -100%)`;
   }
 
   #addCloseButton(): void {

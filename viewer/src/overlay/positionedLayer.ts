@@ -47,8 +47,13 @@ export abstract class PositionedLayer<E extends object> extends MapLayer<Overlay
   #find(map: OverlayHost): void {
     const given = this.#given;
     if (isVector(given)) return;
-    map.findPosition(given).then((found) => {
-      if (this.#given === given && this.map === map) this.setPosition(found);
-    }).catch((reason: unknown) => { map.report(asError(reason)); });
+    map
+      .findPosition(given)
+      .then((found) => {
+        if (this.#given === given && this.map === map) this.setPosition(found);
+      })
+      .catch((reason: unknown) => {
+        map.report(asError(reason));
+      });
   }
 }

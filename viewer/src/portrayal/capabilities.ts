@@ -67,7 +67,10 @@ const MAX_NAME = 500;
 
 /** Reads a capabilities document (OGC 15-001r4 §8.3), with or without qualified elements. @throws PortrayalError */
 export function readCapabilities(root: Element, where: string): Capabilities {
-  if (root.localName !== "Capabilities") throw new PortrayalError(`${where}: expected the capabilities of a 3D Portrayal Service, got the element ${root.localName.slice(0, 60)}`);
+  if (root.localName !== "Capabilities")
+    throw new PortrayalError(
+      `${where}: expected the capabilities of a 3D Portrayal Service, got the element ${root.localName.slice(0, 60)}`,
+    );
   const service = textOf(findBelow(root, "ServiceIdentification", "ServiceType"), 40);
   if (service && !/3DPS/i.test(service)) throw new PortrayalError(`${where}: expected the service 3DPS, got ${service}`);
   const view = findBelow(root, "PortrayalCapabilities", "Extensions", "ViewPortrayalCapabilitiesExtension");
@@ -75,11 +78,17 @@ export function readCapabilities(root: Element, where: string): Capabilities {
   collectLayers(findBelow(root, "Contents"), { crs: [], queryable: false }, layers, where);
   return {
     provider: textOf(findBelow(root, "ServiceProvider", "ProviderName"), 200),
-    operations: new Map(childrenNamed(findBelow(root, "OperationsMetadata"), "Operation").map((operation) => [attributeOf(operation, "name") ?? "", readOperation(operation)])),
+    operations: new Map(
+      childrenNamed(findBelow(root, "OperationsMetadata"), "Operation").map((operation) => [
+        attributeOf(operation, "name") ?? "",
+        readOperation(operation),
+      ]),
+    ),
     layers,
     imageLayers: readImageLayers(view),
     orthographic: readProjection(view),
-    multipart: textOf(childrenNamed(view, "SupportsMultipleViews")[0] ?? childrenNamed(view, "supportsMultipleViews")[0]).toLowerCase() !== "false",
+    multipart:
+      textOf(childrenNamed(view, "SupportsMultipleViews")[0] ?? childrenNamed(view, "supportsMultipleViews")[0]).toLowerCase() !== "false",
   };
 }
 
@@ -96,7 +105,10 @@ function collectLayers(parent: Element | undefined, inherited: Inherited, found:
 }
 
 function readLayer(element: Element, inherited: Inherited): ServiceLayer {
-  const texts = (name: string): string[] => childrenNamed(element, name).map((child) => textOf(child, MAX_NAME)).filter(Boolean);
+  const texts = (name: string): string[] =>
+    childrenNamed(element, name)
+      .map((child) => textOf(child, MAX_NAME))
+      .filter(Boolean);
   const queryable = attributeOf(findBelow(element, "Extensions", "InfoLayerExtension"), "queryable");
   const [lonLatBox = null] = childrenNamed(element, "WGS84BoundingBox").flatMap(readBox);
   return {
@@ -107,21 +119,32 @@ function readLayer(element: Element, inherited: Inherited): ServiceLayer {
     boxes: childrenNamed(element, "BoundingBox").flatMap(readBox),
     lonLatBox,
     queryable: queryable === null ? inherited.queryable : /^(true|1)$/i.test(queryable),
-    renderings: childrenNamed(element, "Metadata").filter((link) => attributeOf(link, "role") === RENDERING_ROLE).map((link) => [attributeOf(link, "title") ?? "", attributeOf(link, "href") ?? ""] as const),
+    renderings: childrenNamed(element, "Metadata")
+      .filter((link) => attributeOf(link, "role") === RENDERING_ROLE)
+      .map((link) => [attributeOf(link, "title") ?? "", attributeOf(link, "href") ?? ""] as const),
   };
 }
 
 /** Returns no box unless both corners have two or three finite numbers in order. */
 function readBox(element: Element): ServiceBox[] {
-  const corner = (name: string): number[] => textOf(findBelow(element, name)).split(/[\s,]+/).filter(Boolean).map(Number);
+  const corner = (name: string): number[] =>
+    textOf(findBelow(element, name))
+      .split(/[\s,]+/)
+      .filter(Boolean)
+      .map(Number);
   const [low, high] = [corner("LowerCorner"), corner("UpperCorner")];
-  const ok = low.length === high.length && (low.length === 2 || low.length === 3) && low.every((value, k) => Number.isFinite(value) && Number.isFinite(high[k]) && value <= Number(high[k]));
+  const ok =
+    low.length === high.length &&
+    (low.length === 2 || low.length === 3) &&
+    low.every((value, k) => Number.isFinite(value) && Number.isFinite(high[k]) && value <= Number(high[k]));
   return ok ? [{ crs: attributeOf(element, "crs") ?? "", low, high }] : [];
 }
 
 function readOperation(operation: Element): ServiceOperation {
   const parameters = new Map(childrenNamed(operation, "Parameter").map((one) => [attributeOf(one, "name")?.toLowerCase() ?? "", one]));
-  const formats = childrenNamed(findBelow(parameters.get("format"), "AllowedValues"), "Value").map((value) => textOf(value, 100).toLowerCase());
+  const formats = childrenNamed(findBelow(parameters.get("format"), "AllowedValues"), "Value").map((value) =>
+    textOf(value, 100).toLowerCase(),
+  );
   return { url: attributeOf(findBelow(operation, "DCP", "HTTP", "Get"), "href"), formats, parameters: new Set(parameters.keys()) };
 }
 
@@ -129,23 +152,40 @@ function readOperation(operation: Element): ServiceOperation {
 function readImageLayers(view: Element | undefined): Capabilities["imageLayers"] {
   const found = childrenNamed(view, "AvailableImageLayer").map((element) => {
     const identifier = textOf(findBelow(element, "Identifier"), MAX_NAME);
-    const formats = childrenNamed(element, "AvailableFormat").map((format) => textOf(format, 100)).filter(Boolean);
+    const formats = childrenNamed(element, "AvailableFormat")
+      .map((format) => textOf(format, 100))
+      .filter(Boolean);
     return [identifier.replace(/^.*[/#]/, "").toUpperCase(), { identifier, formats }] as const;
   });
   return found.length > 0 ? new Map(found.reverse()) : new Map([["COLOR", { identifier: "COLOR", formats: ["image/png", "image/jpeg"] }]]);
 }
 
 function readProjection(view: Element | undefined): ProjectionParameter[] | null {
-  const isOrthographic = (projection: Element): boolean => ["Identifier", "TypeName"].some((name) => textOf(findBelow(projection, name)).replace(/^.*[/#:]/, "").toLowerCase() === "orthographic");
+  const isOrthographic = (projection: Element): boolean =>
+    ["Identifier", "TypeName"].some(
+      (name) =>
+        textOf(findBelow(projection, name))
+          .replace(/^.*[/#:]/, "")
+          .toLowerCase() === "orthographic",
+    );
   const projections = childrenNamed(view, "AvailableProjection");
   const found = projections.find(isOrthographic);
   if (!found) return projections.length > 0 ? [] : null;
   const parameters = childrenNamed(found, "ProjectionParameter");
-  return parameters.length === 0 ? null : parameters.map((element) => ({ name: (attributeOf(element, "name") ?? "").toLowerCase().replace(/[^a-z0-9]/g, ""), required: attributeOf(element, "required")?.toLowerCase() !== "false" }));
+  return parameters.length === 0
+    ? null
+    : parameters.map((element) => ({
+        name: (attributeOf(element, "name") ?? "").toLowerCase().replace(/[^a-z0-9]/g, ""),
+        required: attributeOf(element, "required")?.toLowerCase() !== "false",
+      }));
 }
 
 /** A box as easting, northing and height. */
 export function toEastNorth(box: ServiceBox, northFirst: boolean, heights: readonly [number, number]): readonly [Vec3, Vec3] {
-  const turn = ([first = 0, second = 0, height]: readonly number[], missing: number): Vec3 => [northFirst ? second : first, northFirst ? first : second, height ?? missing];
+  const turn = ([first = 0, second = 0, height]: readonly number[], missing: number): Vec3 => [
+    northFirst ? second : first,
+    northFirst ? first : second,
+    height ?? missing,
+  ];
   return [turn(box.low, heights[0]), turn(box.high, heights[1])];
 }

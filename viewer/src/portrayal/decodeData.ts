@@ -48,7 +48,12 @@ function readNormals({ channels, data }: DecodedPng, rgbOrder: boolean): Uint8Ar
 function readIds({ channels, data }: DecodedPng): Uint32Array<ArrayBuffer> {
   const values = new Uint32Array(data.length / channels);
   for (let k = 0, at = 0; k < values.length; k++, at += channels) {
-    values[k] = ((data[at] as number) | ((data[at + 1] as number) << 8) | ((data[at + 2] as number) << 16) | ((channels === 4 ? (data[at + 3] as number) : 0) << 24)) >>> 0;
+    values[k] =
+      ((data[at] as number) |
+        ((data[at + 1] as number) << 8) |
+        ((data[at + 2] as number) << 16) |
+        ((channels === 4 ? (data[at + 3] as number) : 0) << 24)) >>>
+      0;
   }
   return values;
 }
@@ -57,5 +62,7 @@ function readIds({ channels, data }: DecodedPng): Uint32Array<ArrayBuffer> {
 function readDepths({ data }: DecodedPng, far_m: number): Uint32Array<ArrayBuffer> {
   const floats = new Float32Array(data.buffer, data.byteOffset, data.byteLength / 4);
   const far = far_m * (1 - 1e-6);
-  return Uint32Array.from(floats, (metres) => (metres > 0 && metres < far ? Math.min(Math.round(metres / DEPTH_UNIT_M), NO_DEPTH - 1) : NO_DEPTH));
+  return Uint32Array.from(floats, (metres) =>
+    metres > 0 && metres < far ? Math.min(Math.round(metres / DEPTH_UNIT_M), NO_DEPTH - 1) : NO_DEPTH,
+  );
 }

@@ -19,6 +19,10 @@ export function readFeatureInfo(root: Element): ObjectInfo | null {
   }
   const name = textOf(findBelow(feature, "FeatureId")) || String(attributes.get("name") ?? "");
   const kind = textOf(findBelow(feature, "TypeName")) || (attributeOf(feature, "featureType") ?? String(attributes.get("class") ?? ""));
-  for (const [key, value] of [["name", name], ["class", kind]] as const) if (attributes.get(key) === value) attributes.delete(key);
+  for (const [key, value] of [
+    ["name", name],
+    ["class", kind],
+  ] as const)
+    if (attributes.get(key) === value) attributes.delete(key);
   return { name, class: kind, parent: null, attributes: Object.fromEntries(attributes) };
 }

@@ -26,23 +26,54 @@ const TARGET_M = 1000;
 export function parseViewId(id: string): readonly [lookAtDeg: number, pitchDeg: number] {
   const [, a, p] = /^(\d{1,3}(?:\.\d+)?)-(\d{1,2}(?:\.\d+)?)$/.exec(id) ?? [];
   const [lookAtDeg, pitchDeg] = [Number(a), Number(p)];
-  if (!(lookAtDeg < 360) || !(pitchDeg > 0 && pitchDeg <= 90)) throw new UsageError(`view "${id}": expected a look-at angle from 0 to 360 and a pitch from 0 to 90, such as "45-22.5"`);
+  if (!(lookAtDeg < 360) || !(pitchDeg > 0 && pitchDeg <= 90))
+    throw new UsageError(`view "${id}": expected a look-at angle from 0 to 360 and a pitch from 0 to 90, such as "45-22.5"`);
   return [lookAtDeg, pitchDeg];
 }
 
 /** Makes views whose square holds a local box from all directions: spec/pyramid.md §2. */
-export function makeViews(box: Box3, ids: readonly string[], resolution_m: number, tilePx: number): { views: View[]; size_m: number; zmax: number } {
+export function makeViews(
+  box: Box3,
+  ids: readonly string[],
+  resolution_m: number,
+  tilePx: number,
+): { views: View[]; size_m: number; zmax: number } {
   const center = boxCenter(box);
   const half = sub(box[1], box[0]).map((side) => Math.max((side / 2) * GROWTH, 1)) as unknown as Vec3;
   const axes = ids.map((id) => ({ id: parseViewId(id), axes: computeAxes(...parseViewId(id)) }));
-  const extent = Math.max(...axes.flatMap(({ axes: { right, up } }) => [right, up].map((axis) => 2 * axis.reduce((sum, part, k) => sum + Math.abs(part) * (half[k] as number), 0))));
+  const extent = Math.max(
+    ...axes.flatMap(({ axes: { right, up } }) =>
+      [right, up].map((axis) => 2 * axis.reduce((sum, part, k) => sum + Math.abs(part) * (half[k] as number), 0)),
+    ),
+  );
   const zmax = Math.max(0, Math.ceil(Math.log2(extent / (tilePx * resolution_m))));
-  if (zmax > DEEPEST_LEVEL) throw new UsageError(`resolution_m ${String(resolution_m)}: the layer would have ${String(zmax)} levels, the limit is ${String(DEEPEST_LEVEL)}`);
+  if (zmax > DEEPEST_LEVEL)
+    throw new UsageError(
+      `resolution_m ${String(resolution_m)}: the layer would have ${String(zmax)} levels, the limit is ${String(DEEPEST_LEVEL)}`,
+    );
   const size_m = tilePx * resolution_m * 2 ** zmax;
   const views = axes.map(({ id: [look_at_deg, pitch_deg], axes: view }): View => {
     const [u, v, d] = uvdFromLocal(view, center);
-    const frame = makeFrame({ id: viewId(look_at_deg, pitch_deg), look_at_deg, pitch_deg, u0_m: u - size_m / 2, v0_m: v + size_m / 2, d0_m: d - Math.hypot(...half) - ROOM_M }, size_m, tilePx, zmax);
-    return { id: frame.id, frame, occupancy: { has: (tile) => meetsBox(frame, tile, center, half) }, archives: undefined, versionOf: () => 1 };
+    const frame = makeFrame(
+      {
+        id: viewId(look_at_deg, pitch_deg),
+        look_at_deg,
+        pitch_deg,
+        u0_m: u - size_m / 2,
+        v0_m: v + size_m / 2,
+        d0_m: d - Math.hypot(...half) - ROOM_M,
+      },
+      size_m,
+      tilePx,
+      zmax,
+    );
+    return {
+      id: frame.id,
+      frame,
+      occupancy: { has: (tile) => meetsBox(frame, tile, center, half) },
+      archives: undefined,
+      versionOf: () => 1,
+    };
   });
   return { views, size_m, zmax };
 }
@@ -68,5 +99,12 @@ export function placeCamera(frame: Frame, tile: Tile, origin: Vec3, box: Box3): 
   const [u, v] = [frame.u0 + (tile.x + 0.5) * side, frame.v0 - (tile.y + 0.5) * side];
   const at = (d: number): Vec3 => add(origin, localFromUvd(frame.axes, [u, v, d]));
   const deepest = Math.max(...corners(box).map((corner) => dot(frame.axes.forward, corner)));
-  return { position: at(frame.d0), target: at(frame.d0 + TARGET_M), up: frame.axes.up, half_m: side / 2, far_m: Math.ceil(deepest - frame.d0 + Math.hypot(...sub(box[1], box[0])) + ROOM_M), straightDown: frame.pitchDeg === 90 };
+  return {
+    position: at(frame.d0),
+    target: at(frame.d0 + TARGET_M),
+    up: frame.axes.up,
+    half_m: side / 2,
+    far_m: Math.ceil(deepest - frame.d0 + Math.hypot(...sub(box[1], box[0])) + ROOM_M),
+    straightDown: frame.pitchDeg === 90,
+  };
 }

@@ -42,25 +42,45 @@ export const isRgbOrder = (format: string): boolean => normalize(format).include
 export function chooseImages({ imageLayers }: Capabilities, colorFormat?: string): ReadonlyMap<LayerKind, RequestedImage> {
   const found = new Map<LayerKind, RequestedImage>();
   for (const [kind, name] of Object.entries(IMAGE_LAYERS) as [RequestedKind, string][]) {
-    const image = chooseImage(imageLayers.get(name), kind, kind === "color" && colorFormat !== undefined ? [normalize(colorFormat)] : PREFERRED[kind]);
+    const image = chooseImage(
+      imageLayers.get(name),
+      kind,
+      kind === "color" && colorFormat !== undefined ? [normalize(colorFormat)] : PREFERRED[kind],
+    );
     if (image) found.set(kind, image);
   }
   return found;
 }
 
 /** Returns the additional images that the options ask for. @throws UsageError if the service does not advertise them or their parameter */
-export function chooseAdditionalImages({ imageLayers, operations }: Capabilities, { occlusion = false, sun }: PortrayalOptions, url: string): RequestedImage[] {
+export function chooseAdditionalImages(
+  { imageLayers, operations }: Capabilities,
+  { occlusion = false, sun }: PortrayalOptions,
+  url: string,
+): RequestedImage[] {
   const view = operations.get("GetView");
-  const wanted: [boolean, keyof typeof ADDITIONAL_LAYERS, string][] = [[occlusion, "ao", "occlusion"], [sun !== undefined, "sun", "sun"]];
-  return wanted.filter(([isWanted]) => isWanted).map(([, kind, option]) => {
-    const name = ADDITIONAL_LAYERS[kind];
-    const offered = imageLayers.get(name);
-    if (!offered) throw new UsageError(`${option}: ${url} does not advertise the image layer ${name}; it has ${[...imageLayers.keys()].join(", ")}`);
-    const image = chooseImage(offered, kind, PREFERRED[kind]);
-    if (!image) throw new UsageError(`${option}: ${url} does not advertise ${name} as ${PREFERRED[kind].join(", ")}; it has ${offered.formats.join(", ") || "no formats"}`);
-    if (kind === "sun" && !view?.parameters.has("sun")) throw new UsageError(`${option}: the GetView of ${url} does not advertise the parameter SUN, so that the direction of the light cannot be chosen`);
-    return image;
-  });
+  const wanted: [boolean, keyof typeof ADDITIONAL_LAYERS, string][] = [
+    [occlusion, "ao", "occlusion"],
+    [sun !== undefined, "sun", "sun"],
+  ];
+  return wanted
+    .filter(([isWanted]) => isWanted)
+    .map(([, kind, option]) => {
+      const name = ADDITIONAL_LAYERS[kind];
+      const offered = imageLayers.get(name);
+      if (!offered)
+        throw new UsageError(`${option}: ${url} does not advertise the image layer ${name}; it has ${[...imageLayers.keys()].join(", ")}`);
+      const image = chooseImage(offered, kind, PREFERRED[kind]);
+      if (!image)
+        throw new UsageError(
+          `${option}: ${url} does not advertise ${name} as ${PREFERRED[kind].join(", ")}; it has ${offered.formats.join(", ") || "no formats"}`,
+        );
+      if (kind === "sun" && !view?.parameters.has("sun"))
+        throw new UsageError(
+          `${option}: the GetView of ${url} does not advertise the parameter SUN, so that the direction of the light cannot be chosen`,
+        );
+      return image;
+    });
 }
 
 function chooseImage(offered: OfferedImageLayer | undefined, kind: RequestedKind, wanted: readonly string[]): RequestedImage | null {
@@ -70,18 +90,36 @@ function chooseImage(offered: OfferedImageLayer | undefined, kind: RequestedKind
 
 /** Checks options that do not depend on the service. @throws UsageError */
 export function checkImageOptions({ colorFormat, colorQuality, sun }: PortrayalOptions): void {
-  if (colorQuality !== undefined && !(Number.isInteger(colorQuality) && colorQuality >= 0 && colorQuality <= 100)) throw new UsageError(`colorQuality: expected a whole number from 0 to 100, got ${String(colorQuality)}`);
-  if (colorQuality !== undefined && !LOSSY.includes(mediaTypeOf(colorFormat ?? ""))) throw new UsageError(`colorQuality: needs a lossy colorFormat, ${LOSSY.join(" or ")}, got ${colorFormat ?? "none"}`);
-  if (sun && !(sun.azimuth_deg >= 0 && sun.azimuth_deg <= 360 && sun.altitude_deg > 0 && sun.altitude_deg <= 90)) throw new UsageError(`sun: expected azimuth_deg from 0 to 360 and altitude_deg above 0 and up to 90, got ${String(sun.azimuth_deg)} and ${String(sun.altitude_deg)}`);
+  if (colorQuality !== undefined && !(Number.isInteger(colorQuality) && colorQuality >= 0 && colorQuality <= 100))
+    throw new UsageError(`colorQuality: expected a whole number from 0 to 100, got ${String(colorQuality)}`);
+  if (colorQuality !== undefined && !LOSSY.includes(mediaTypeOf(colorFormat ?? "")))
+    throw new UsageError(`colorQuality: needs a lossy colorFormat, ${LOSSY.join(" or ")}, got ${colorFormat ?? "none"}`);
+  if (sun && !(sun.azimuth_deg >= 0 && sun.azimuth_deg <= 360 && sun.altitude_deg > 0 && sun.altitude_deg <= 90))
+    throw new UsageError(
+      `sun: expected azimuth_deg from 0 to 360 and altitude_deg above 0 and up to 90, got ${String(sun.azimuth_deg)} and ${String(sun.altitude_deg)}`,
+    );
 }
 
 /** Describes the layers as a manifest does. */
 export function describeLayers(images: ReadonlyMap<LayerKind, RequestedImage>, sun?: SunDirection): LayerInfo[] {
   return [...images.values()].map(({ kind, mediaType }) => {
     // Where nothing is, JPEGs have the service's background; the id layer masks it.
-    const format = kind === "color" ? (mediaType !== "image/jpeg" ? mediaType.replace("image/", "") : images.has("id") ? "jpeg" : "opaque") : "png";
-    return { name: kind, kind, format, media_type: mediaType, ...(kind === "depth" && { unit_m: DEPTH_UNIT_M }), ...(kind === "sun" && sun && { suns: [describeSun(sun)] }) };
+    const format =
+      kind === "color" ? (mediaType !== "image/jpeg" ? mediaType.replace("image/", "") : images.has("id") ? "jpeg" : "opaque") : "png";
+    return {
+      name: kind,
+      kind,
+      format,
+      media_type: mediaType,
+      ...(kind === "depth" && { unit_m: DEPTH_UNIT_M }),
+      ...(kind === "sun" && sun && { suns: [describeSun(sun)] }),
+    };
   });
 }
 
-const describeSun = (sun: SunDirection): NonNullable<LayerInfo["suns"]>[number] => ({ time: null, azimuth_deg: sun.azimuth_deg, elevation_deg: sun.altitude_deg, direction: towardsLight(sun) });
+const describeSun = (sun: SunDirection): NonNullable<LayerInfo["suns"]>[number] => ({
+  time: null,
+  azimuth_deg: sun.azimuth_deg,
+  elevation_deg: sun.altitude_deg,
+  direction: towardsLight(sun),
+});

@@ -10,7 +10,9 @@ export interface ImageHeader {
 /** Reads the header of a PNG, JPEG or WebP image, before anything is decoded; null for other bytes. */
 export function readImageHeader(bytes: Uint8Array): ImageHeader | null {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const at = (offset: number, text: string): boolean => offset + text.length <= bytes.length && Array.from({ length: text.length }, (_, k) => text.charCodeAt(k)).every((code, k) => bytes[offset + k] === code);
+  const at = (offset: number, text: string): boolean =>
+    offset + text.length <= bytes.length &&
+    Array.from({ length: text.length }, (_, k) => text.charCodeAt(k)).every((code, k) => bytes[offset + k] === code);
   if (at(0, "\x89PNG\r\n\x1a\n") && bytes.length >= 33) {
     return { mediaType: "image/png", width: view.getUint32(16), height: view.getUint32(20), complete: at(bytes.length - 8, "IEND") };
   }
@@ -27,7 +29,7 @@ const JPEG_TRAILER = 64;
 
 /** Reads the first frame header: markers C0 to CF except C4, C8 and CC. */
 function readJpeg(view: DataView): ImageHeader | null {
-  for (let at = 2; at + 9 < view.byteLength && view.getUint8(at) === 0xff; ) {
+  for (let at = 2; at + 9 < view.byteLength && view.getUint8(at) === 0xff;) {
     const marker = view.getUint8(at + 1);
     if (marker === 0xff) {
       at++;
@@ -42,7 +44,8 @@ function readJpeg(view: DataView): ImageHeader | null {
 }
 
 function hasJpegEnd(view: DataView): boolean {
-  for (let at = view.byteLength - 2; at >= Math.max(2, view.byteLength - JPEG_TRAILER); at--) if (view.getUint16(at) === 0xffd9) return true;
+  for (let at = view.byteLength - 2; at >= Math.max(2, view.byteLength - JPEG_TRAILER); at--)
+    if (view.getUint16(at) === 0xffd9) return true;
   return false;
 }
 

@@ -24,13 +24,21 @@ const [CHECKED_M, SAME_UNIT] = [20, 2] as const;
 
 /** Finds the layers of a request. @throws UsageError, PortrayalError */
 export function chooseLayers({ layers }: Capabilities, { layers: wanted, styles = [] }: PortrayalOptions, where: string): ServiceLayer[] {
-  const known = (): string => layers.slice(0, 20).map(({ identifier }) => identifier).join(", ");
+  const known = (): string =>
+    layers
+      .slice(0, 20)
+      .map(({ identifier }) => identifier)
+      .join(", ");
   const names = typeof wanted === "string" ? [wanted] : (wanted ?? []);
   if (layers.length === 0) throw new PortrayalError(`${where}: the service lists no layer`);
-  const chosen = names.length === 0 ? [layers.find(({ boxes }) => boxes.length > 0) ?? layers[0]] : names.map((name) => layers.find(({ identifier }) => identifier === name) ?? name);
+  const chosen =
+    names.length === 0
+      ? [layers.find(({ boxes }) => boxes.length > 0) ?? layers[0]]
+      : names.map((name) => layers.find(({ identifier }) => identifier === name) ?? name);
   const missing = chosen.find((one) => typeof one === "string");
   if (missing !== undefined) throw new UsageError(`${where} has no layer "${missing}"; it has ${known()}`);
-  if (styles.length > 0 && styles.length !== chosen.length) throw new UsageError(`styles: expected one per layer, got ${String(styles.length)} for ${String(chosen.length)}`);
+  if (styles.length > 0 && styles.length !== chosen.length)
+    throw new UsageError(`styles: expected one per layer, got ${String(styles.length)} for ${String(chosen.length)}`);
   return chosen as ServiceLayer[];
 }
 
@@ -39,10 +47,16 @@ export function placeLayers(layers: readonly ServiceLayer[], options: PortrayalO
   const [first, ...others] = layers as [ServiceLayer, ...ServiceLayer[]];
   const shared = first.crs.filter((crs) => others.every((layer) => layer.crs.some((other) => isSameSystem(crs, other))));
   const listed = shared.join(", ") || "none";
-  if (options.crs !== undefined && !shared.some((crs) => isSameSystem(crs, options.crs as string))) throw new UsageError(`${where}: the layer is not available in ${options.crs}; it has ${listed}`);
+  if (options.crs !== undefined && !shared.some((crs) => isSameSystem(crs, options.crs as string)))
+    throw new UsageError(`${where}: the layer is not available in ${options.crs}; it has ${listed}`);
   const candidates = options.crs === undefined ? shared.filter((crs) => !GEOGRAPHIC.test(crs)) : [options.crs];
-  const crs = candidates.find((one) => options.box !== undefined || layers.every((layer) => findBox(layer, one) !== undefined && !isGeographic(layer, one)));
-  if (crs === undefined) throw new PortrayalError(`${where}: layer ${first.identifier} has no bounding box in a projected coordinate system; it has ${listed}. Give the options crs and box`);
+  const crs = candidates.find(
+    (one) => options.box !== undefined || layers.every((layer) => findBox(layer, one) !== undefined && !isGeographic(layer, one)),
+  );
+  if (crs === undefined)
+    throw new PortrayalError(
+      `${where}: layer ${first.identifier} has no bounding box in a projected coordinate system; it has ${listed}. Give the options crs and box`,
+    );
   const epsg = epsgOf(crs);
   const northFirst = options.axes === undefined ? epsg !== null && isNorthFirst(epsg) : options.axes === "north-east";
   if (options.box) return { crs, epsg, northFirst, box: options.box };
@@ -53,18 +67,21 @@ export function placeLayers(layers: readonly ServiceLayer[], options: PortrayalO
 }
 
 /** Returns the box of a layer in a system. A box without a system is in that of the layer's first one. */
-const findBox = ({ boxes, crs: [first = ""] }: ServiceLayer, crs: string): ServiceBox | undefined => boxes.find((box) => isSameSystem(box.crs || first, crs));
+const findBox = ({ boxes, crs: [first = ""] }: ServiceLayer, crs: string): ServiceBox | undefined =>
+  boxes.find((box) => isSameSystem(box.crs || first, crs));
 
 /** Are the numbers of the box those of its longitudes and latitudes? */
 function isGeographic(layer: ServiceLayer, crs: string): boolean {
   const [box, degrees] = [findBox(layer, crs), layer.lonLatBox];
   if (!box || !degrees) return false;
-  const near = (axes: readonly [number, number]): boolean => axes.every((axis, k) => Math.abs(Number(box.low[k]) - Number(degrees.low[axis])) < 0.1);
+  const near = (axes: readonly [number, number]): boolean =>
+    axes.every((axis, k) => Math.abs(Number(box.low[k]) - Number(degrees.low[axis])) < 0.1);
   return near([0, 1]) || near([1, 0]);
 }
 
 function readBox(layer: ServiceLayer, box: ServiceBox, northFirst: boolean, where: string): Box3 {
-  if (box.low.length < 3) throw new PortrayalError(`${where}: the bounding box of layer ${layer.identifier} has no heights; give the option box`);
+  if (box.low.length < 3)
+    throw new PortrayalError(`${where}: the bounding box of layer ${layer.identifier} has no heights; give the option box`);
   const found = toEastNorth(box, northFirst, [0, 0]);
   checkUnit(layer, found, where);
   return found;
@@ -78,7 +95,9 @@ function checkUnit({ identifier, lonLatBox }: ServiceLayer, box: Box3, where: st
   const metres = Math.hypot((east - west) * Math.cos(((south + north) * Math.PI) / 360), north - south) * DEGREE_M;
   const units = Math.hypot(...sub(box[1], box[0]).slice(0, 2));
   if (metres < CHECKED_M || (units / metres < SAME_UNIT && metres / units < SAME_UNIT)) return;
-  throw new PortrayalError(`${where}: the bounding box of layer ${identifier} is ${units.toFixed(0)} units wide, but ${metres.toFixed(0)} m by its longitudes and latitudes; map3d needs a coordinate system in metres`);
+  throw new PortrayalError(
+    `${where}: the bounding box of layer ${identifier} is ${units.toFixed(0)} units wide, but ${metres.toFixed(0)} m by its longitudes and latitudes; map3d needs a coordinate system in metres`,
+  );
 }
 
 /** Returns the origin of local coordinates: the centre of the box's base, in whole metres. */

@@ -18,7 +18,7 @@ export function splitMultipart(message: ArrayBuffer, contentType: string): Messa
   const bytes = new Uint8Array(message);
   const delimiter = new TextEncoder().encode(`--${quoted ?? plain ?? STANDARD_BOUNDARY}`);
   const parts: MessagePart[] = [];
-  for (let from = findDelimiter(bytes, delimiter, 0); from >= 0; ) {
+  for (let from = findDelimiter(bytes, delimiter, 0); from >= 0;) {
     const start = from + delimiter.length;
     if (bytes[start] === DASH && bytes[start + 1] === DASH) return parts;
     const next = findDelimiter(bytes, delimiter, start);
@@ -45,7 +45,7 @@ function findDelimiter(bytes: Uint8Array, delimiter: Uint8Array, from: number): 
 function readPart(bytes: Uint8Array, start: number, end: number): MessagePart | null {
   let at = bytes.indexOf(LF, start) + 1;
   let mediaType = "";
-  for (const limit = at + MAX_HEADER_BYTES; ; ) {
+  for (const limit = at + MAX_HEADER_BYTES; ;) {
     const lineEnd = bytes.indexOf(LF, at);
     if (at === 0 || lineEnd < 0 || lineEnd >= end || lineEnd > limit) return null;
     const line = new TextDecoder("latin1").decode(bytes.subarray(at, lineEnd)).trim();

@@ -1,10 +1,30 @@
 import { sub } from "../core/vec";
-import { readManifest, UsageError, type FetchFunction, type LayerInfo, type LayerKind, type ManifestJson, type Rendering, type Source, type Tile, type TileData, type View } from "../map3d";
+import {
+  readManifest,
+  UsageError,
+  type FetchFunction,
+  type LayerInfo,
+  type LayerKind,
+  type ManifestJson,
+  type Rendering,
+  type Source,
+  type Tile,
+  type TileData,
+  type View,
+} from "../map3d";
 import { readCapabilities, type Capabilities, type ServiceLayer } from "./capabilities";
 import { DataDecoder } from "./dataDecoder";
 import { readFeatureInfo } from "./featureInfo";
 import { makeViews, placeCamera } from "./grid";
-import { checkImageOptions, chooseAdditionalImages, chooseImages, describeLayers, IMAGE_LAYERS, isRgbOrder, type RequestedImage } from "./imageFormats";
+import {
+  checkImageOptions,
+  chooseAdditionalImages,
+  chooseImages,
+  describeLayers,
+  IMAGE_LAYERS,
+  isRgbOrder,
+  type RequestedImage,
+} from "./imageFormats";
 import { pngColorType } from "./imageHeader";
 import { chooseLayers, originOf, placeLayers, type LayerPlace } from "./layerPlace";
 import { DEFAULT_RESOLUTION_M, DEFAULT_VIEWS, TILE_PX, type PortrayalOptions } from "./options";
@@ -23,7 +43,11 @@ export interface PortrayalSource extends Source {
 /** Largest documents, bytes. */
 const [MAX_CAPABILITIES, MAX_MANIFEST, MAX_INFO] = [16 << 20, 64 << 20, 1 << 20] as const;
 const OBJECT = /^objects\/(\d{1,10})\.json$/;
-const WITHOUT: Partial<Record<LayerKind, string>> = { normal: "no light", id: "no picking, highlights or styles", depth: "no positions, measuring or combination with other layers" };
+const WITHOUT: Partial<Record<LayerKind, string>> = {
+  normal: "no light",
+  id: "no picking, highlights or styles",
+  depth: "no positions, measuring or combination with other layers",
+};
 
 /**
  * Reads a layer of an OGC 3D Portrayal Service 1.0: one orthographic GetView per tile, in the pixel grid of the rendering that the layer links to, if it does.
@@ -56,9 +80,10 @@ class ServiceSource implements PortrayalSource {
     const full = new URL(url, globalThis.document.baseURI);
     if (!/^https?:$/.test(full.protocol)) throw new UsageError(`a 3D Portrayal Service needs an http or https URL, got "${url}"`);
     full.hash = "";
-    if (options.resolution_m !== undefined && !(options.resolution_m > 0)) throw new UsageError(`resolution_m: expected metres per pixel above 0, got ${String(options.resolution_m)}`);
+    if (options.resolution_m !== undefined && !(options.resolution_m > 0))
+      throw new UsageError(`resolution_m: expected metres per pixel above 0, got ${String(options.resolution_m)}`);
     checkImageOptions(options);
-    if (options.views?.length === 0) throw new UsageError("views: expected at least one view, such as \"0-45\"");
+    if (options.views?.length === 0) throw new UsageError('views: expected at least one view, such as "0-45"');
     this.#url = full.href;
     this.#options = options;
     this.#fetch = options.fetch ?? ((...given) => fetch(...given));
@@ -70,7 +95,9 @@ class ServiceSource implements PortrayalSource {
 
   async manifest(): Promise<Rendering> {
     this.#opened ??= this.#open();
-    this.#opened.catch(() => { this.#opened = undefined; });
+    this.#opened.catch(() => {
+      this.#opened = undefined;
+    });
     return (await this.#opened).rendering;
   }
 
@@ -79,7 +106,12 @@ class ServiceSource implements PortrayalSource {
     const { info, identifiers } = await this.#ready();
     if (id === undefined || !info) return null;
     const where = `${info.url}: GetFeatureInfoByObjectId`;
-    const answer = await fetchAnswer({ url: objectUrl(info.url, identifiers, Number(id), info.format), where, limit_bytes: MAX_INFO, fetch: this.#fetch });
+    const answer = await fetchAnswer({
+      url: objectUrl(info.url, identifiers, Number(id), info.format),
+      where,
+      limit_bytes: MAX_INFO,
+      fetch: this.#fetch,
+    });
     const found = readFeatureInfo(parseXml(answer.bytes, where));
     return { map3d: "objects", version: 1, shard: Number(id), objects: found ? { [id]: found } : {} };
   }
@@ -128,10 +160,17 @@ class ServiceSource implements PortrayalSource {
 
   async #fetchCapabilities(): Promise<Capabilities> {
     const where = `${this.#url}: GetCapabilities`;
-    const answer = await fetchAnswer({ url: withQuery(this.#url, "service=3DPS&request=GetCapabilities&acceptVersions=1.0"), where, limit_bytes: MAX_CAPABILITIES, fetch: this.#fetch });
+    const answer = await fetchAnswer({
+      url: withQuery(this.#url, "service=3DPS&request=GetCapabilities&acceptVersions=1.0"),
+      where,
+      limit_bytes: MAX_CAPABILITIES,
+      fetch: this.#fetch,
+    });
     const capabilities = readCapabilities(parseXml(answer.bytes, where), where);
-    if (capabilities.operations.size > 0 && !capabilities.operations.has("GetView")) throw new PortrayalError(`${where}: the service does not offer GetView, which images need`);
-    if (capabilities.orthographic?.length === 0) throw new PortrayalError(`${where}: the service does not offer the orthographic projection, which tiles need`);
+    if (capabilities.operations.size > 0 && !capabilities.operations.has("GetView"))
+      throw new PortrayalError(`${where}: the service does not offer GetView, which images need`);
+    if (capabilities.orthographic?.length === 0)
+      throw new PortrayalError(`${where}: the service does not offer the orthographic projection, which tiles need`);
     return capabilities;
   }
 
@@ -141,24 +180,37 @@ class ServiceSource implements PortrayalSource {
     if (!operation && operations.size > 0) return null;
     const [own, full] = [new URL(this.#url), new URL(operation?.url ?? this.#url, this.#url)];
     if (full.hostname === own.hostname) full.protocol = own.protocol;
-    if (!/^https?:$/.test(full.protocol)) throw new PortrayalError(`${this.#url}: ${name} has the URL ${full.href.slice(0, 100)}, expected http or https`);
+    if (!/^https?:$/.test(full.protocol))
+      throw new PortrayalError(`${this.#url}: ${name} has the URL ${full.href.slice(0, 100)}, expected http or https`);
     return full.href;
   }
 
   #chooseImages(capabilities: Capabilities): ReadonlyMap<LayerKind, RequestedImage> {
     const { colorFormat } = this.#options;
     const images = chooseImages(capabilities, colorFormat);
-    if (!images.has("color")) throw new (colorFormat === undefined ? PortrayalError : UsageError)(`${this.#url}: the service has no COLOR images as ${colorFormat ?? "PNG, JPEG or WebP"}; it has ${capabilities.imageLayers.get("COLOR")?.formats.join(", ") ?? "none"}`);
+    if (!images.has("color"))
+      throw new (colorFormat === undefined ? PortrayalError : UsageError)(
+        `${this.#url}: the service has no COLOR images as ${colorFormat ?? "PNG, JPEG or WebP"}; it has ${capabilities.imageLayers.get("COLOR")?.formats.join(", ") ?? "none"}`,
+      );
     this.#missing = (Object.keys(IMAGE_LAYERS) as LayerKind[]).filter((kind) => !images.has(kind));
-    if (this.#missing.length > 0) console.warn(`map3d: ${this.#url} offers no usable ${this.#missing.map((kind) => IMAGE_LAYERS[kind as keyof typeof IMAGE_LAYERS]).join(", ")} images: ${this.#missing.map((kind) => WITHOUT[kind]).join("; ")}`);
-    return new Map([...images, ...chooseAdditionalImages(capabilities, this.#options, this.#url).map((image) => [image.kind, image] as const)]);
+    if (this.#missing.length > 0)
+      console.warn(
+        `map3d: ${this.#url} offers no usable ${this.#missing.map((kind) => IMAGE_LAYERS[kind as keyof typeof IMAGE_LAYERS]).join(", ")} images: ${this.#missing.map((kind) => WITHOUT[kind]).join("; ")}`,
+      );
+    return new Map([
+      ...images,
+      ...chooseAdditionalImages(capabilities, this.#options, this.#url).map((image) => [image.kind, image] as const),
+    ]);
   }
 
   #findInfo(capabilities: Capabilities, layers: readonly ServiceLayer[]): OpenedLayer["info"] {
     const operation = capabilities.operations.get("GetFeatureInfoByObjectId");
     const formats = operation?.formats ?? [];
     const format = formats.length === 0 ? "text/xml" : formats.find((one) => /^(text|application)\/xml\b/.test(one));
-    const url = operation && format !== undefined && layers.every(({ queryable }) => queryable) ? this.#operationUrl(capabilities, "GetFeatureInfoByObjectId") : null;
+    const url =
+      operation && format !== undefined && layers.every(({ queryable }) => queryable)
+        ? this.#operationUrl(capabilities, "GetFeatureInfoByObjectId")
+        : null;
     return url !== null && format !== undefined ? { url, format } : null;
   }
 
@@ -168,16 +220,25 @@ class ServiceSource implements PortrayalSource {
     const links = layers.length === 1 ? (layers[0]?.renderings ?? []) : [];
     if (wanted === false || (wanted === undefined && (views ?? resolution_m ?? box) !== undefined)) return null;
     const link = wanted === undefined ? links[0] : links.find(([name]) => name === wanted);
-    if (wanted !== undefined && !link) throw new UsageError(`${this.#url}: the layer links to no rendering "${wanted}"; it links to ${links.map(([name]) => name).join(", ") || "none"}`);
+    if (wanted !== undefined && !link)
+      throw new UsageError(
+        `${this.#url}: the layer links to no rendering "${wanted}"; it links to ${links.map(([name]) => name).join(", ") || "none"}`,
+      );
     const url = link && new URL(link[1], this.#url);
     if (!url) return null;
     const own = new URL(this.#url);
     if (url.hostname === own.hostname) url.protocol = own.protocol;
-    if (url.origin !== own.origin) throw new PortrayalError(`${this.#url}: the layer links to a rendering of another server, ${url.origin}; set the option rendering to false`);
+    if (url.origin !== own.origin)
+      throw new PortrayalError(
+        `${this.#url}: the layer links to a rendering of another server, ${url.origin}; set the option rendering to false`,
+      );
     const where = `${this.#url}: manifest of rendering "${link[0]}"`;
     const answer = await fetchAnswer({ url: url.href, where, limit_bytes: MAX_MANIFEST, fetch: this.#fetch });
     const found = readManifest(parseJson(answer.bytes, where), where);
-    if (found.json.crs.epsg !== epsg) throw new PortrayalError(`${where}: has the coordinate system EPSG:${String(found.json.crs.epsg)}, but the layer EPSG:${String(epsg)}; set the option rendering to false`);
+    if (found.json.crs.epsg !== epsg)
+      throw new PortrayalError(
+        `${where}: has the coordinate system EPSG:${String(found.json.crs.epsg)}, but the layer EPSG:${String(epsg)}; set the option rendering to false`,
+      );
     return found;
   }
 
@@ -189,8 +250,21 @@ class ServiceSource implements PortrayalSource {
     const { views, size_m, zmax } = makeViews(local, ids, resolution_m, TILE_PX);
     const titles = layers.map(({ title, identifier }) => title || identifier);
     const json: ManifestJson = {
-      map3d: "rendering", version: 1, name: layers.map(({ identifier }) => identifier).join(","), title: titles.join(", "), attribution: provider, content_version: 1, complete: true,
-      crs: { epsg, wkt: null, name: crs, vertical: null }, origin, box: local, tile_px: TILE_PX, zmax, size_m, layers: [], views: [],
+      map3d: "rendering",
+      version: 1,
+      name: layers.map(({ identifier }) => identifier).join(","),
+      title: titles.join(", "),
+      attribution: provider,
+      content_version: 1,
+      complete: true,
+      crs: { epsg, wkt: null, name: crs, vertical: null },
+      origin,
+      box: local,
+      tile_px: TILE_PX,
+      zmax,
+      size_m,
+      layers: [],
+      views: [],
     };
     return { json, views: new Map(views.map((view) => [view.id, view])), layers: new Map() };
   }

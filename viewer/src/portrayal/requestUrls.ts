@@ -22,14 +22,20 @@ export interface ViewTemplate {
 }
 
 /** The order of OGC 15-001r4 Table 40. */
-const STANDARD: readonly ProjectionParameter[] = ["poc", "poi", "up", "left", "right", "bottom", "top", "nearplane", "farplane"].map((name) => ({ name, required: name === "poc" || name === "poi" }));
+const STANDARD: readonly ProjectionParameter[] = ["poc", "poi", "up", "left", "right", "bottom", "top", "nearplane", "farplane"].map(
+  (name) => ({ name, required: name === "poc" || name === "poi" }),
+);
 /** Distance of the near plane, metres: some renderers refuse 0. The content is much farther. */
 const NEAR_M = 1;
 const DECIMALS = 9;
 const BEST_QUALITY = 100;
 
 /** Writes a number without an exponent. */
-export const formatNumber = (value: number): string => value.toFixed(DECIMALS).replace(/\.?0+$/, "").replace(/^-0$/, "0");
+export const formatNumber = (value: number): string =>
+  value
+    .toFixed(DECIMALS)
+    .replace(/\.?0+$/, "")
+    .replace(/^-0$/, "0");
 
 /** Appends parameters to a URL that may have some. Their names and values must be encoded. */
 export function withQuery(endpoint: string, query: string): string {
@@ -47,7 +53,10 @@ export function viewUrl(template: ViewTemplate, camera: TileCamera, images: read
   const projection = ["Orthographic", ...projectionValues(template, camera)].join(",");
   const portrayal = `WIDTH=${side};HEIGHT=${side};PROJECTION=${projection};IMAGELAYERS=${list(images.map(({ identifier }) => identifier))};FORMATS=${list(images.map(({ format }) => format))}`;
   // One value for each image; those of exact formats have no effect.
-  const qualities = colorQuality !== undefined && has("color") ? `;QUALITIES=${images.map(({ kind }) => String(kind === "color" ? colorQuality : BEST_QUALITY)).join(",")}` : "";
+  const qualities =
+    colorQuality !== undefined && has("color")
+      ? `;QUALITIES=${images.map(({ kind }) => String(kind === "color" ? colorQuality : BEST_QUALITY)).join(",")}`
+      : "";
   const parameters = [
     "service=3DPS&request=GetView&version=1.0",
     `crs=${encodeURIComponent(crs)}`,
@@ -72,18 +81,36 @@ function projectionValues({ projection, northFirst, endpoint }: ViewTemplate, ca
     ["up", camera.straightDown ? turn(camera.up) : upOptional ? null : [0, 0, 1]],
   ]);
   const half = camera.half_m;
-  const numbers = new Map(Object.entries({ left: -half, right: half, bottom: -half, top: half, nearplane: NEAR_M, near: NEAR_M, farplane: camera.far_m, far: camera.far_m }));
+  const numbers = new Map(
+    Object.entries({
+      left: -half,
+      right: half,
+      bottom: -half,
+      top: half,
+      nearplane: NEAR_M,
+      near: NEAR_M,
+      farplane: camera.far_m,
+      far: camera.far_m,
+    }),
+  );
   return ordered.flatMap(({ name, required }) => {
     const [, group = "", axis = ""] = /^(poc|poi|up)x?([1-3]?)$/.exec(name) ?? [];
     const position = positions.get(group);
-    if (position !== undefined) return axis === "" ? position?.map(formatNumber) ?? ["", "", ""] : [position ? formatNumber(position[Number(axis) - 1] as number) : ""];
+    if (position !== undefined)
+      return axis === ""
+        ? (position?.map(formatNumber) ?? ["", "", ""])
+        : [position ? formatNumber(position[Number(axis) - 1] as number) : ""];
     const number = numbers.get(name);
-    if (number === undefined && required) throw new PortrayalError(`${endpoint}: the orthographic projection requires the parameter "${name}", which map3d does not know`);
+    if (number === undefined && required)
+      throw new PortrayalError(`${endpoint}: the orthographic projection requires the parameter "${name}", which map3d does not know`);
     return [number === undefined ? "" : formatNumber(number)];
   });
 }
 
 /** Returns the GetFeatureInfoByObjectId request of an object (OGC 15-001r4 §11.6). */
 export function objectUrl(endpoint: string, layers: readonly string[], id: number, format: string): string {
-  return withQuery(endpoint, `service=3DPS&request=GetFeatureInfoByObjectId&version=1.0&layers=${list(layers)}&objectId=${String(id)}&format=${encodeURIComponent(format)}`);
+  return withQuery(
+    endpoint,
+    `service=3DPS&request=GetFeatureInfoByObjectId&version=1.0&layers=${list(layers)}&objectId=${String(id)}&format=${encodeURIComponent(format)}`,
+  );
 }

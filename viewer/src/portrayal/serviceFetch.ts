@@ -36,25 +36,39 @@ export function fetchAnswer(request: FetchRequest): Promise<ServiceAnswer> {
 async function fetchOnce(request: FetchRequest): Promise<ServiceAnswer | FailedAttempt> {
   const { url, where, signal } = request;
   const ending = new AbortController();
-  const stop = (): void => { ending.abort(); };
+  const stop = (): void => {
+    ending.abort();
+  };
   signal?.throwIfAborted();
   signal?.addEventListener("abort", stop);
-  const timer = setTimeout(() => { ending.abort(LATE); }, TIMEOUT_MS);
+  const timer = setTimeout(() => {
+    ending.abort(LATE);
+  }, TIMEOUT_MS);
   try {
     return await readAnswer(await request.fetch(url, { signal: ending.signal }), request, stop);
   } catch (reason) {
     signal?.throwIfAborted();
     if (reason instanceof FetchError || reason instanceof PortrayalError) return new FailedAttempt(reason, false);
-    if (ending.signal.reason === LATE) return new FailedAttempt(new FetchError(`${where}: no complete answer within ${String(TIMEOUT_MS / 1000)} s`), false);
+    if (ending.signal.reason === LATE)
+      return new FailedAttempt(new FetchError(`${where}: no complete answer within ${String(TIMEOUT_MS / 1000)} s`), false);
     const why = reason instanceof Error ? reason.message : String(reason);
-    return new FailedAttempt(new FetchError(`${where}: no complete answer (${why}); the server cannot be reached, cut its answer, or does not allow pages of other origins (Access-Control-Allow-Origin)`), true);
+    return new FailedAttempt(
+      new FetchError(
+        `${where}: no complete answer (${why}); the server cannot be reached, cut its answer, or does not allow pages of other origins (Access-Control-Allow-Origin)`,
+      ),
+      true,
+    );
   } finally {
     clearTimeout(timer);
     signal?.removeEventListener("abort", stop);
   }
 }
 
-async function readAnswer(response: Response, { where, limit_bytes }: FetchRequest, stop: () => void): Promise<ServiceAnswer | FailedAttempt> {
+async function readAnswer(
+  response: Response,
+  { where, limit_bytes }: FetchRequest,
+  stop: () => void,
+): Promise<ServiceAnswer | FailedAttempt> {
   const { status, ok } = response;
   const contentType = response.headers.get("Content-Type") ?? "";
   const bytes = await readBytes(response, ok ? limit_bytes : Math.min(limit_bytes, MAX_REPORT_BYTES), where, stop);
@@ -83,7 +97,8 @@ async function readBytes({ body, status, headers }: Response, limit: number, whe
   return new Blob(parts).arrayBuffer();
 }
 
-const isXml = (contentType: string, bytes: ArrayBuffer): boolean => /[/+.](xml|se_xml)$/.test(essenceOf(contentType)) || /^\s*<\?xml/.test(new TextDecoder("latin1").decode(bytes.slice(0, 100)));
+const isXml = (contentType: string, bytes: ArrayBuffer): boolean =>
+  /[/+.](xml|se_xml)$/.test(essenceOf(contentType)) || /^\s*<\?xml/.test(new TextDecoder("latin1").decode(bytes.slice(0, 100)));
 
 /** Returns the exception of a report (OGC 15-001r4 §8.4.3; also those of older services); null for another document. */
 function findException(bytes: ArrayBuffer, where: string): PortrayalError | null {
@@ -93,5 +108,8 @@ function findException(bytes: ArrayBuffer, where: string): PortrayalError | null
   const code = attributeOf(exception, "exceptionCode") ?? attributeOf(exception, "code") ?? "NoApplicableCode";
   const locator = attributeOf(exception, "locator");
   const text = textOf(exception, 300).replace(/\s+/g, " ");
-  return new PortrayalError(`${where}: the service answers ${code.slice(0, 60)}${locator ? ` (${locator.slice(0, 60)})` : ""}${text ? `: ${text}` : ""}`, code);
+  return new PortrayalError(
+    `${where}: the service answers ${code.slice(0, 60)}${locator ? ` (${locator.slice(0, 60)})` : ""}${text ? `: ${text}` : ""}`,
+    code,
+  );
 }

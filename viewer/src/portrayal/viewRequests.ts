@@ -60,7 +60,8 @@ export class ViewRequests {
     try {
       const found = await this.#fetchTogether(camera, images, ending.signal);
       // A copy for each: the receivers move the bytes to other threads.
-      for (const { image, resolve } of waiting) resolve((found[images.indexOf(kinds.get(image.kind) as RequestedImage)] as ArrayBuffer).slice(0));
+      for (const { image, resolve } of waiting)
+        resolve((found[images.indexOf(kinds.get(image.kind) as RequestedImage)] as ArrayBuffer).slice(0));
     } catch (reason) {
       for (const { signal, reject } of waiting) reject(signal?.aborted === true ? signal.reason : reason);
     } finally {
@@ -98,17 +99,29 @@ export class ViewRequests {
 function splitAnswer({ contentType, bytes }: ServiceAnswer, count: number, where: string): { mediaType: string; bytes: ArrayBuffer }[] {
   const mediaType = essenceOf(contentType);
   if (!mediaType.startsWith("multipart/")) {
-    if (count > 1) throw new PortrayalError(`${where}: expected ${String(count)} images as multipart/mixed, got ${mediaType || "no content type"}`);
+    if (count > 1)
+      throw new PortrayalError(`${where}: expected ${String(count)} images as multipart/mixed, got ${mediaType || "no content type"}`);
     return [{ mediaType, bytes }];
   }
   const parts = splitMultipart(bytes, contentType);
-  if (parts?.length !== count) throw new PortrayalError(`${where}: expected ${String(count)} images, got ${parts ? String(parts.length) : "a multipart message that is cut or malformed"}`);
+  if (parts?.length !== count)
+    throw new PortrayalError(
+      `${where}: expected ${String(count)} images, got ${parts ? String(parts.length) : "a multipart message that is cut or malformed"}`,
+    );
   return parts;
 }
 
 /** Checks type, size and end of an image before it is decoded. @throws PortrayalError */
-function checkImage(bytes: ArrayBuffer, mediaType: string, { mediaType: wanted }: RequestedImage, side_px: number, where: string): ArrayBuffer {
-  const fail = (got: string): never => { throw new PortrayalError(`${where}: expected ${wanted} of ${String(side_px)} × ${String(side_px)} pixels, got ${got}`); };
+function checkImage(
+  bytes: ArrayBuffer,
+  mediaType: string,
+  { mediaType: wanted }: RequestedImage,
+  side_px: number,
+  where: string,
+): ArrayBuffer {
+  const fail = (got: string): never => {
+    throw new PortrayalError(`${where}: expected ${wanted} of ${String(side_px)} × ${String(side_px)} pixels, got ${got}`);
+  };
   if (bytes.byteLength === 0) return fail("an answer without content: the service does not say why");
   const said = mediaType.replace("image/jpg", "image/jpeg");
   if (said !== wanted) return fail(`${mediaType || "no content type"} of ${String(bytes.byteLength)} bytes`);
@@ -121,7 +134,14 @@ function checkImage(bytes: ArrayBuffer, mediaType: string, { mediaType: wanted }
 /** Returns a signal that aborts when all of those who wait have aborted. */
 function abortWhenAll(waiting: readonly Waiting[]): { signal: AbortSignal; release(): void } {
   const ending = new AbortController();
-  const check = (): void => { if (waiting.every(({ signal }) => signal?.aborted === true)) ending.abort(); };
+  const check = (): void => {
+    if (waiting.every(({ signal }) => signal?.aborted === true)) ending.abort();
+  };
   for (const { signal } of waiting) signal?.addEventListener("abort", check);
-  return { signal: ending.signal, release: () => { for (const { signal } of waiting) signal?.removeEventListener("abort", check); } };
+  return {
+    signal: ending.signal,
+    release: () => {
+      for (const { signal } of waiting) signal?.removeEventListener("abort", check);
+    },
+  };
 }

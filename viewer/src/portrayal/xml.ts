@@ -8,7 +8,8 @@ export function parseXml(bytes: ArrayBuffer, where: string): Element {
   const text = decode(bytes, where);
   if (/<!(DOCTYPE|ENTITY)/i.test(text)) throw new PortrayalError(`${where}: the XML has a document type declaration, which map3d refuses`);
   const root = new DOMParser().parseFromString(text, "application/xml").documentElement;
-  if (root.localName === "parsererror" || root.getElementsByTagName("parsererror").length > 0) throw new PortrayalError(`${where}: the answer is not well-formed XML`);
+  if (root.localName === "parsererror" || root.getElementsByTagName("parsererror").length > 0)
+    throw new PortrayalError(`${where}: the answer is not well-formed XML`);
   return root;
 }
 
@@ -17,7 +18,9 @@ function decode(bytes: ArrayBuffer, where: string): string {
   const head = new Uint8Array(bytes, 0, Math.min(bytes.byteLength, 200));
   const [a = 0, b = 0] = head;
   const mark = a === 0xfe && b === 0xff ? "utf-16be" : a === 0xff && b === 0xfe ? "utf-16le" : null;
-  const declared = /^\s*<\?xml[^>]*\bencoding\s*=\s*["']([\w.-]+)["']/.exec(new TextDecoder("latin1").decode(head).replace(/^\u00ef\u00bb\u00bf/, ""));
+  const declared = /^\s*<\?xml[^>]*\bencoding\s*=\s*["']([\w.-]+)["']/.exec(
+    new TextDecoder("latin1").decode(head).replace(/^\u00ef\u00bb\u00bf/, ""),
+  );
   const label = mark ?? declared?.[1] ?? "utf-8";
   try {
     return new TextDecoder(label, { fatal: true }).decode(bytes);
@@ -27,7 +30,8 @@ function decode(bytes: ArrayBuffer, where: string): string {
 }
 
 /** Returns the children with a local name, whatever their prefix: servers qualify the elements in different ways. */
-export const childrenNamed = (parent: Element | null | undefined, name: string): Element[] => (parent ? [...parent.children].filter((child) => child.localName === name) : []);
+export const childrenNamed = (parent: Element | null | undefined, name: string): Element[] =>
+  parent ? [...parent.children].filter((child) => child.localName === name) : [];
 
 /** Returns the first element below `parent`, child by child. */
 export function findBelow(parent: Element | null | undefined, ...path: readonly string[]): Element | undefined {

@@ -43,7 +43,16 @@ export class Decorations {
     const toPicture = (at: number, mapSize: number, pictureSize: number): number => ((at - mapSize / 2) * scale) / unit + pictureSize / 2;
     this.#markers = map.markers.flatMap(({ label, position, options: { color = accent, showLabel } }) => {
       const at = position && map.project(position);
-      return at ? [{ x: toPicture(at[0], map.canvas.clientWidth, this.#width), y: toPicture(at[1], map.canvas.clientHeight, this.#height), label: showLabel ? label : "", color }] : [];
+      return at
+        ? [
+            {
+              x: toPicture(at[0], map.canvas.clientWidth, this.#width),
+              y: toPicture(at[1], map.canvas.clientHeight, this.#height),
+              label: showLabel ? label : "",
+              color,
+            },
+          ]
+        : [];
     });
   }
 
@@ -59,7 +68,9 @@ export class Decorations {
     const lines = this.#wrap(text, 18, 600, this.#width * 0.6);
     const width = Math.max(...lines.map((line) => this.#widthOf(line, 18, 600)));
     this.#panel(MARGIN, MARGIN, width + 2 * PAD, lines.length * ROW + PAD);
-    lines.forEach((line, k) => { this.#text(line, MARGIN + PAD, MARGIN + PAD / 2 + (k + 0.5) * ROW, 18, 600); });
+    lines.forEach((line, k) => {
+      this.#text(line, MARGIN + PAD, MARGIN + PAD / 2 + (k + 0.5) * ROW, 18, 600);
+    });
   }
 
   /** Draws legend, scale bar and attribution, from the bottom up. */
@@ -76,7 +87,10 @@ export class Decorations {
     context.translate(this.#width - MARGIN - 22, MARGIN + 22);
     disc(context, 22);
     context.rotate((this.#lookAt_deg * Math.PI) / 180);
-    for (const [tip, color] of [[-15, INK], [15, "#b9bcc0"]] as const) {
+    for (const [tip, color] of [
+      [-15, INK],
+      [15, "#b9bcc0"],
+    ] as const) {
       context.beginPath();
       context.moveTo(0, tip);
       context.lineTo(6, 0);
@@ -103,7 +117,10 @@ export class Decorations {
       this.#panel(x - width / 2, y - 48, width, 24, 12);
       this.#text(label, x - width / 2 + 10, y - 36, 13, 550);
     }
-    for (const [radius, fill] of [[6, "#fff"], [4, color]] as const) {
+    for (const [radius, fill] of [
+      [6, "#fff"],
+      [4, color],
+    ] as const) {
       context.beginPath();
       context.arc(x, y, radius, 0, 2 * Math.PI);
       context.fillStyle = fill;
@@ -120,7 +137,9 @@ export class Decorations {
     this.#context.fillStyle = PANEL;
     this.#context.fillRect(this.#width - width - 16, this.#height - height, width + 16, height);
     this.#context.textAlign = "right";
-    lines.forEach((line, k) => { this.#text(line, this.#width - 8, this.#height - height + 3 + (k + 0.5) * 15, 11, 400, FAINT); });
+    lines.forEach((line, k) => {
+      this.#text(line, this.#width - 8, this.#height - height + 3 + (k + 0.5) * 15, 11, 400, FAINT);
+    });
     this.#context.textAlign = "left";
     return height;
   }
@@ -130,7 +149,13 @@ export class Decorations {
     const metres = floorToRound(Math.min(SCALE_BAR_MAX_PX, this.#width / 3) * this.#unit_m);
     const length = metres / this.#unit_m;
     context.beginPath();
-    for (const [x, y] of [[0, -7], [0, 0], [length, 0], [length, -7]] as const) context.lineTo(MARGIN + x, bottom + y);
+    for (const [x, y] of [
+      [0, -7],
+      [0, 0],
+      [length, 0],
+      [length, -7],
+    ] as const)
+      context.lineTo(MARGIN + x, bottom + y);
     this.#strokeWithHalo(1.5);
     context.textAlign = "center";
     context.font = `500 12px ${FONT}`;
@@ -142,7 +167,10 @@ export class Decorations {
 
   #legend({ title, classes, chosen = classes }: PictureLegend, bottom: number): void {
     const labels = chosen.map(({ label }) => label);
-    const width = Math.min(Math.max(this.#widthOf(title, 13, 600), ...labels.map((label) => this.#widthOf(label, 13, 400) + SWATCH + 9)), this.#width * 0.5);
+    const width = Math.min(
+      Math.max(this.#widthOf(title, 13, 600), ...labels.map((label) => this.#widthOf(label, 13, 400) + SWATCH + 9)),
+      this.#width * 0.5,
+    );
     const top = bottom - (chosen.length + 1) * ROW - PAD;
     this.#panel(MARGIN, top, width + 2 * PAD, bottom - top);
     this.#text(this.#truncate(title, 13, 600, width), MARGIN + PAD, top + PAD / 2 + ROW / 2, 13, 600);
@@ -180,7 +208,10 @@ export class Decorations {
   #strokeWithHalo(width: number): void {
     const context = this.#context;
     context.lineJoin = "round";
-    for (const [color, wide] of [[HALO, width + 3], [INK, width]] as const) {
+    for (const [color, wide] of [
+      [HALO, width + 3],
+      [INK, width],
+    ] as const) {
       [context.strokeStyle, context.lineWidth] = [color, wide];
       context.stroke();
     }

@@ -46,7 +46,11 @@ export async function exportPicture(shown: map, options: PictureOptions = {}): P
   const { clientWidth, clientHeight } = shown.canvas;
   const { width_px, height_px, scale: requested = (width_px ?? NaN) / clientWidth || (height_px ?? NaN) / clientHeight || 2 } = options;
   const [width, height] = [width_px ?? Math.round(clientWidth * requested), height_px ?? Math.round(clientHeight * requested)];
-  for (const [name, side] of [["width", width], ["height", height]] as const) checkSide(name, side);
+  for (const [name, side] of [
+    ["width", width],
+    ["height", height],
+  ] as const)
+    checkSide(name, side);
   const scale = Math.min(width / clientWidth, height / clientHeight);
   const context = createContext(width, height);
   fillBackground(context, options.background ?? getComputedStyle(shown.container).backgroundColor);
@@ -63,7 +67,8 @@ export async function exportPicture(shown: map, options: PictureOptions = {}): P
 }
 
 function checkSide(name: string, side: number): void {
-  if (!Number.isInteger(side) || side < 1 || side > LONGEST_SIDE_PX) throw new UsageError(`the picture's ${name} must be a whole number from 1 to ${String(LONGEST_SIDE_PX)} pixels, got ${String(side)}`);
+  if (!Number.isInteger(side) || side < 1 || side > LONGEST_SIDE_PX)
+    throw new UsageError(`the picture's ${name} must be a whole number from 1 to ${String(LONGEST_SIDE_PX)} pixels, got ${String(side)}`);
 }
 
 /** Creates a canvas and checks that it works: without enough memory, browsers silently draw nothing. @throws DrawError */
@@ -72,7 +77,10 @@ function createContext(width: number, height: number): CanvasRenderingContext2D 
   [canvas.width, canvas.height] = [width, height];
   const context = canvas.getContext("2d");
   context?.fillRect(width - 1, height - 1, 1, 1);
-  if (context?.getImageData(width - 1, height - 1, 1, 1).data[3] !== 255) throw new DrawError(`the browser has too little memory for a picture of ${String(width)} × ${String(height)} pixels; choose a smaller size`);
+  if (context?.getImageData(width - 1, height - 1, 1, 1).data[3] !== 255)
+    throw new DrawError(
+      `the browser has too little memory for a picture of ${String(width)} × ${String(height)} pixels; choose a smaller size`,
+    );
   context.clearRect(0, 0, width, height);
   return context;
 }
@@ -84,9 +92,21 @@ function fillBackground(context: CanvasRenderingContext2D, color: string): void 
 }
 
 /** Draws over the map, which is in the middle of the picture. */
-function drawOverlay(context: CanvasRenderingContext2D, { clientWidth, clientHeight }: Pick<Element, "clientWidth" | "clientHeight">, scale: number, draw: PictureOptions["overlay"]): void {
+function drawOverlay(
+  context: CanvasRenderingContext2D,
+  { clientWidth, clientHeight }: Pick<Element, "clientWidth" | "clientHeight">,
+  scale: number,
+  draw: PictureOptions["overlay"],
+): void {
   context.save();
-  context.setTransform(scale, 0, 0, scale, (context.canvas.width - clientWidth * scale) / 2, (context.canvas.height - clientHeight * scale) / 2);
+  context.setTransform(
+    scale,
+    0,
+    0,
+    scale,
+    (context.canvas.width - clientWidth * scale) / 2,
+    (context.canvas.height - clientHeight * scale) / 2,
+  );
   draw?.(context);
   context.restore();
 }
@@ -95,7 +115,12 @@ function encodePng(canvas: HTMLCanvasElement): Promise<Blob> {
   return new Promise((resolve, reject) => {
     canvas.toBlob((blob) => {
       if (blob) resolve(blob);
-      else reject(new DrawError(`the browser could not encode a picture of ${String(canvas.width)} × ${String(canvas.height)} pixels; choose a smaller size`));
+      else
+        reject(
+          new DrawError(
+            `the browser could not encode a picture of ${String(canvas.width)} × ${String(canvas.height)} pixels; choose a smaller size`,
+          ),
+        );
     }, "image/png");
   });
 }

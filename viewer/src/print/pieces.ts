@@ -28,9 +28,14 @@ interface Fraction {
 const PIECE_PX = 1024;
 
 /** Draws the view of a map piece by piece, with a second map off the screen. @throws the error of a tile, or the signal's reason */
-export async function drawPieces(shown: map, { width, height, scale }: PictureExtent, into: CanvasRenderingContext2D, { signal, progress }: PieceOptions): Promise<void> {
+export async function drawPieces(
+  shown: map,
+  { width, height, scale }: PictureExtent,
+  into: CanvasRenderingContext2D,
+  { signal, progress }: PieceOptions,
+): Promise<void> {
   const state = shown.getViewState();
-  if (!state || shown.drawer === null) throw new UsageError("the map is not ready; wait for its event \"ready\"");
+  if (!state || shown.drawer === null) throw new UsageError('the map is not ready; wait for its event "ready"');
   const { camera, origin } = state;
   const side = { width: Math.min(PIECE_PX, width), height: Math.min(PIECE_PX, height) };
   const px_m = shown.metresPerPixel / scale;
@@ -45,7 +50,10 @@ export async function drawPieces(shown: map, { width, height, scale }: PictureEx
       const middle = { x: x + (box.clientWidth * scale) / 2, y: y + (box.clientHeight * scale) / 2 };
       const corner = { x: (x - width / 2) / scale / camera.width + 0.5, y: (y - height / 2) / scale / camera.height + 0.5 };
       offscreen.clip(corner, { x: box.clientWidth / camera.width, y: box.clientHeight / camera.height });
-      offscreen.map.syncCamera({ ...camera, u: camera.u + (middle.x - width / 2) * px_m, v: camera.v - (middle.y - height / 2) * px_m }, origin);
+      offscreen.map.syncCamera(
+        { ...camera, u: camera.u + (middle.x - width / 2) * px_m, v: camera.v - (middle.y - height / 2) * px_m },
+        origin,
+      );
       await offscreen.complete(signal);
       into.drawImage(offscreen.map.canvas, 0, 0, side.width, side.height, x, y, side.width, side.height);
       progress?.(k + 1, across * down);
@@ -58,7 +66,16 @@ export async function drawPieces(shown: map, { width, height, scale }: PictureEx
 /** Creates an invisible, inert element of a size. */
 function createBox(width: number, height: number): HTMLElement {
   const box = element("div", "", { "aria-hidden": "true", inert: "" });
-  Object.assign(box.style, { position: "fixed", left: "0", top: "0", width: `${String(width)}px`, height: `${String(height)}px`, visibility: "hidden", contain: "strict", zIndex: "-1" });
+  Object.assign(box.style, {
+    position: "fixed",
+    left: "0",
+    top: "0",
+    width: `${String(width)}px`,
+    height: `${String(height)}px`,
+    visibility: "hidden",
+    contain: "strict",
+    zIndex: "-1",
+  });
   document.body.append(box);
   return box;
 }
@@ -77,14 +94,27 @@ class OffscreenMap {
     this.#box = box;
     const { light, drawer, options } = shown;
     this.map = new map(box, {
-      light, ...(drawer && { drawer }), direction: shown.direction, concurrency: options.concurrency, ...(options.cacheBytes !== undefined && { cacheBytes: options.cacheBytes }), workers: options.workers,
-      dataSaver: false, pixelRatio: scale, maxTileRatio: Infinity, finer: scale >= 1.5 ? 0.5 : 0, controls: false, attribution: false, preserveDrawingBuffer: true,
+      light,
+      ...(drawer && { drawer }),
+      direction: shown.direction,
+      concurrency: options.concurrency,
+      ...(options.cacheBytes !== undefined && { cacheBytes: options.cacheBytes }),
+      workers: options.workers,
+      dataSaver: false,
+      pixelRatio: scale,
+      maxTileRatio: Infinity,
+      finer: scale >= 1.5 ? 0.5 : 0,
+      controls: false,
+      attribution: false,
+      preserveDrawingBuffer: true,
     });
     this.#failed = new Promise((_, reject) => {
       this.map.on("error", ({ error }) => {
         if ([FetchError, DecodeError, DrawError].some((kind) => error instanceof kind)) reject(error);
       });
-      this.map.on("contextlost", () => { reject(new DrawError("the graphics context was lost during the export; try again or choose a smaller size")); });
+      this.map.on("contextlost", () => {
+        reject(new DrawError("the graphics context was lost during the export; try again or choose a smaller size"));
+      });
     });
     this.#failed.catch(() => undefined);
     this.#shown = shown.layers.filter(({ rendering }) => rendering);
@@ -102,7 +132,9 @@ class OffscreenMap {
 
   /** Estimates the light of the whole picture at the resolution of CSS pixels, as on the screen, and keeps it for the pieces. */
   async estimateLight(camera: Camera, origin: Vec3, signal: AbortSignal | undefined): Promise<void> {
-    const { map: { lightEstimator, options } } = this;
+    const {
+      map: { lightEstimator, options },
+    } = this;
     const { pixelRatio } = options;
     if (!lightEstimator || !this.#shade?.needs?.length || !pixelRatio) return;
     const { clientWidth, clientHeight } = this.#box;
@@ -118,7 +150,9 @@ class OffscreenMap {
   /** Resizes the map, which learns of it before a later observer does. */
   async #resize(width: number, height: number): Promise<void> {
     Object.assign(this.#box.style, { width: `${String(width)}px`, height: `${String(height)}px` });
-    await new Promise((done) => { new ResizeObserver(done).observe(this.map.canvas); });
+    await new Promise((done) => {
+      new ResizeObserver(done).observe(this.map.canvas);
+    });
   }
 
   /** Clips the layers like those of the map. @param corner, size the piece, as fractions of the map */
@@ -126,7 +160,16 @@ class OffscreenMap {
     this.#layers.forEach((layer, k) => {
       const clip = this.#shown[k]?.clip;
       const [across, down] = [(at: number): number => (at - corner.x) / size.x, (at: number): number => (at - corner.y) / size.y];
-      layer.setClip(clip ? [clip[0] === 0 ? -1e6 : across(clip[0]), clip[1] === 0 ? -1e6 : down(clip[1]), clip[2] === 1 ? 1e6 : across(clip[2]), clip[3] === 1 ? 1e6 : down(clip[3])] : null);
+      layer.setClip(
+        clip
+          ? [
+              clip[0] === 0 ? -1e6 : across(clip[0]),
+              clip[1] === 0 ? -1e6 : down(clip[1]),
+              clip[2] === 1 ? 1e6 : across(clip[2]),
+              clip[3] === 1 ? 1e6 : down(clip[3]),
+            ]
+          : null,
+      );
     });
   }
 
@@ -144,8 +187,16 @@ class OffscreenMap {
     signal?.throwIfAborted();
     const ending = new AbortController();
     const aborted = new Promise<never>((_, reject) => {
-      signal?.addEventListener("abort", () => { reject(signal.reason as Error); }, { signal: ending.signal });
+      signal?.addEventListener(
+        "abort",
+        () => {
+          reject(signal.reason as Error);
+        },
+        { signal: ending.signal },
+      );
     });
-    await Promise.race([done, this.#failed, aborted]).finally(() => { ending.abort(); });
+    await Promise.race([done, this.#failed, aborted]).finally(() => {
+      ending.abort();
+    });
   }
 }

@@ -91,7 +91,14 @@ export class DepthLightEstimator {
     const resources = this.#resources;
     if (resources?.gl === gl && resources.width === width && resources.height === height) return resources;
     this.free();
-    return (this.#resources = { gl, width, height, shares: linkProgram(gl, "shares", VERTEX, SHARES), smooth: linkProgram(gl, "smooth", VERTEX, SMOOTH), targets: [target(gl, width, height), target(gl, width, height)] });
+    return (this.#resources = {
+      gl,
+      width,
+      height,
+      shares: linkProgram(gl, "shares", VERTEX, SHARES),
+      smooth: linkProgram(gl, "smooth", VERTEX, SMOOTH),
+      targets: [target(gl, width, height), target(gl, width, height)],
+    });
   }
 }
 

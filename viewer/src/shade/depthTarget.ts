@@ -6,7 +6,11 @@ export class DepthTarget {
   readonly texture: WebGLTexture;
   readonly #gl: WebGL2RenderingContext;
 
-  constructor(gl: WebGL2RenderingContext, readonly width: number, readonly height: number) {
+  constructor(
+    gl: WebGL2RenderingContext,
+    readonly width: number,
+    readonly height: number,
+  ) {
     this.#gl = gl;
     this.framebuffer = gl.createFramebuffer();
     this.texture = makeTexture(gl, gl.DEPTH_COMPONENT32F, width, height);

@@ -46,7 +46,8 @@ export class ScreenSpaceLight implements LightEstimator {
     const step = Math.max(1, frame.dpr);
     const last = this.#result;
     if (!frame.passes.some((pass) => needsEstimate(frame, pass))) this.#result = null;
-    else if (!lighting?.moving || frame.target || last?.camera.frame !== camera.frame || last.step !== step) this.#result = this.#estimate(gl, frame, step, frame.target?.range ?? getRange(), draw);
+    else if (!lighting?.moving || frame.target || last?.camera.frame !== camera.frame || last.step !== step)
+      this.#result = this.#estimate(gl, frame, step, frame.target?.range ?? getRange(), draw);
   }
 
   /** Whether a pass uses the estimate. */
@@ -71,10 +72,17 @@ export class ScreenSpaceLight implements LightEstimator {
     const now = frame.camera;
     const px = cssPixelM(camera);
     const zoomRatio = cssPixelM(now) / px;
-    const [x, y] = [(now.u - camera.u) / px + camera.width / 2 - (zoomRatio * now.width) / 2, (camera.v - now.v) / px + camera.height / 2 - (zoomRatio * now.height) / 2];
+    const [x, y] = [
+      (now.u - camera.u) / px + camera.width / 2 - (zoomRatio * now.width) / 2,
+      (camera.v - now.v) / px + camera.height / 2 - (zoomRatio * now.height) / 2,
+    ];
     gl.uniform4f(program.at("u_estimateMap"), (zoomRatio * scale) / frame.dpr, x * scale, y * scale, height);
     gl.uniform1f(program.at("u_tolerance"), tolerance);
-    gl.uniform2i(program.at("u_estimated"), Number(frame.light.occlusion && !bakedLight.occlusion), Number(hasShadows(frame) && !bakedLight.shadow));
+    gl.uniform2i(
+      program.at("u_estimated"),
+      Number(frame.light.occlusion && !bakedLight.occlusion),
+      Number(hasShadows(frame) && !bakedLight.shadow),
+    );
   }
 
   #estimate(gl: WebGL2RenderingContext, frame: FrameContent, step: number, range: Vec2, draw: DrawDepths): EstimatedLight {
@@ -89,11 +97,21 @@ export class ScreenSpaceLight implements LightEstimator {
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
-    for (const pass of frame.passes) if (pass.relief && pass.opacity === 1) draw({ ...frame, width, height }, makeDepthPass(pass, step), range);
+    for (const pass of frame.passes)
+      if (pass.relief && pass.opacity === 1) draw({ ...frame, width, height }, makeDepthPass(pass, step), range);
     const { right, up, forward } = camera.frame.axes;
     const towards = towardsLight(light);
     const sun: Vec3 | null = hasShadows(frame) ? [dot(right, towards), dot(up, towards), dot(forward, towards)] : null;
-    const texture = this.#estimator.estimateLight({ gl, depth: picture.texture, width, height, px_m, range, sun, occlusion: light.occlusion });
+    const texture = this.#estimator.estimateLight({
+      gl,
+      depth: picture.texture,
+      width,
+      height,
+      px_m,
+      range,
+      sun,
+      occlusion: light.occlusion,
+    });
     gl.disable(gl.DEPTH_TEST);
     return { texture, range, camera, step, scale: frame.dpr / step, height, tolerance: (2 * px_m) / (range[1] - range[0]) + 1 / 65535 };
   }
@@ -111,11 +129,21 @@ const hasShadows = ({ light }: FrameContent): boolean => light.shadows && light.
 /** Whether a pass lacks rendered light that can be estimated. */
 function needsEstimate(frame: FrameContent, { mode, relief, bakedLight }: LayerPass): boolean {
   const { light } = frame;
-  return relief !== null && mode === "lit" && light.lit && ((light.occlusion && !bakedLight.occlusion) || (hasShadows(frame) && !bakedLight.shadow));
+  return (
+    relief !== null &&
+    mode === "lit" &&
+    light.lit &&
+    ((light.occlusion && !bakedLight.occlusion) || (hasShadows(frame) && !bakedLight.shadow))
+  );
 }
 
 /** Makes a pass that draws depths only, with pixels `step` times as large. */
 function makeDepthPass(pass: LayerPass, step: number): LayerPass {
-  const quads = pass.quads.map(({ from, rect: [left, top, right, bottom], origin: [x, y], scale }) => ({ from, rect: [left / step, top / step, right / step, bottom / step] as const, origin: [x / step, y / step] as const, scale: scale * step }));
+  const quads = pass.quads.map(({ from, rect: [left, top, right, bottom], origin: [x, y], scale }) => ({
+    from,
+    rect: [left / step, top / step, right / step, bottom / step] as const,
+    origin: [x / step, y / step] as const,
+    scale: scale * step,
+  }));
   return { ...pass, mode: "depth", quads, highlight: new Map(), depths: pass.relief };
 }

@@ -16,7 +16,9 @@ export interface ShadeOptions {
  */
 export class shade extends MapLayer<map, object> {
   readonly #light: ScreenSpaceLight;
-  readonly #free = (): void => { this.#light.free(); };
+  readonly #free = (): void => {
+    this.#light.free();
+  };
 
   constructor({ radius_m = 20, thickness_m = 6 }: ShadeOptions = {}) {
     super();
@@ -42,5 +44,10 @@ export class shade extends MapLayer<map, object> {
 /** Does the layer lack shadows or occlusion for this light? */
 function lacksBakedLight(layer: imageLayer, light: Readonly<Light>): boolean {
   const baked = layer.getBakedLight(light);
-  return baked !== null && layer.mode === "lit" && light.lit && ((light.occlusion && !baked.occlusion) || (light.shadows && light.altitude_deg > 0 && !baked.shadow));
+  return (
+    baked !== null &&
+    layer.mode === "lit" &&
+    light.lit &&
+    ((light.occlusion && !baked.occlusion) || (light.shadows && light.altitude_deg > 0 && !baked.shadow))
+  );
 }

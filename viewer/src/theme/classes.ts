@@ -43,13 +43,20 @@ interface Classes {
 }
 
 /** Classifies numbers by range and everything else by value. Text counts as numbers if all values are numeric. @param summary of the whole column; by default, `column` is the whole */
-export function classify({ type }: Pick<AttributeInfo, "type">, column: ReadonlyMap<number, AttributeValue>, options: ClassOptions, summary: Summary = summarize(type, column)): Classification {
+export function classify(
+  { type }: Pick<AttributeInfo, "type">,
+  column: ReadonlyMap<number, AttributeValue>,
+  options: ClassOptions,
+  summary: Summary = summarize(type, column),
+): Classification {
   const { values, numbers } = summary;
   const ranges = numbers && values.length > options.classes && (type === "number" || values.length > 12);
   const ordered = numbers !== undefined && type === "number";
   const { labels, colors, classOf } = ranges ? classifyByRange(numbers, options) : classifyByValue(values, ordered, options);
   const classes = labels.map((label, k) => ({ label, color: colors[k] as string, ids: [] as number[] }));
-  const add = (more: typeof column): void => { for (const [id, value] of more) classes[classOf(value)]?.ids.push(id); };
+  const add = (more: typeof column): void => {
+    for (const [id, value] of more) classes[classOf(value)]?.ids.push(id);
+  };
   add(column);
   return { classes, ordered: ranges ? true : ordered && classes.length <= 6, add };
 }
@@ -57,7 +64,9 @@ export function classify({ type }: Pick<AttributeInfo, "type">, column: Readonly
 function summarize(type: AttributeInfo["type"], column: ReadonlyMap<number, AttributeValue>): Summary {
   const counts = new Map<AttributeValue, number>();
   for (const value of column.values()) counts.set(value, (counts.get(value) ?? 0) + 1);
-  const numbers = Array.from(column.values(), (value) => (type === "boolean" || (typeof value === "string" && value.trim() === "") ? NaN : Number(value)));
+  const numbers = Array.from(column.values(), (value) =>
+    type === "boolean" || (typeof value === "string" && value.trim() === "") ? NaN : Number(value),
+  );
   return numbers.every(Number.isFinite) ? { values: [...counts], numbers: numbers.sort((a, b) => a - b) } : { values: [...counts] };
 }
 
@@ -66,7 +75,11 @@ function classifyByRange(sorted: readonly number[], { classes, colors, language 
   const bounds = classBounds(sorted, classes);
   const format = numberFormat(sorted, language);
   const labels = [...bounds, Infinity].map((_, k) => rangeLabel(bounds[k - 1], bounds[k], format));
-  return { labels, colors: interpolateRamp(colors ?? RAMP, labels.length), classOf: (value) => bounds.filter((bound) => Number(value) >= bound).length };
+  return {
+    labels,
+    colors: interpolateRamp(colors ?? RAMP, labels.length),
+    classOf: (value) => bounds.filter((bound) => Number(value) >= bound).length,
+  };
 }
 
 /** Returns the lower bounds of all classes but the first. */
@@ -98,7 +111,11 @@ function classifyByValue(values: Summary["values"], ordered: boolean, { colors, 
   if (ordered) kept.sort((a, b) => compare(a, b, language));
   const numbers = new Map(kept.map((value, k) => [value, k]));
   const others = frequent.length > kept.length ? [otherLabel] : [];
-  return { labels: [...kept.map(String), ...others], colors: [...palette.slice(0, kept.length), OTHER_COLOR], classOf: (value) => numbers.get(value) ?? kept.length };
+  return {
+    labels: [...kept.map(String), ...others],
+    colors: [...palette.slice(0, kept.length), OTHER_COLOR],
+    classOf: (value) => numbers.get(value) ?? kept.length,
+  };
 }
 
 const compare = (a: AttributeValue, b: AttributeValue, language: string | undefined): number =>
@@ -110,7 +127,9 @@ export function interpolateRamp(ramp: readonly string[], count: number): string[
     const at = count === 1 ? 0 : (k / (count - 1)) * (ramp.length - 1);
     const [from, to] = [ramp[Math.floor(at)] as string, ramp[Math.ceil(at)] as string];
     const channel = (color: string, place: number): number => parseInt(color.slice(1 + 2 * place, 3 + 2 * place), 16);
-    const bytes = [0, 1, 2].map((place) => Math.round(channel(from, place) + (channel(to, place) - channel(from, place)) * (at - Math.floor(at))));
+    const bytes = [0, 1, 2].map((place) =>
+      Math.round(channel(from, place) + (channel(to, place) - channel(from, place)) * (at - Math.floor(at))),
+    );
     return `#${bytes.map((byte) => byte.toString(16).padStart(2, "0")).join("")}`;
   });
 }

@@ -99,19 +99,35 @@ export class theme extends MapLayer<map, ThemeEvents> {
     const messages = getThemeMessages(language);
     const classification = classify(info, column, { classes, colors, language, otherLabel: messages.other }, summary ?? undefined);
     if (summary) await this.#follow(map, info, summary, classification);
-    if (this.map === map) this.#show(map, info.type === "boolean" ? { ...classification, classes: classification.classes.map((row) => ({ ...row, label: row.label === "true" ? messages.yes : messages.no })) } : classification);
+    if (this.map === map)
+      this.#show(
+        map,
+        info.type === "boolean"
+          ? {
+              ...classification,
+              classes: classification.classes.map((row) => ({ ...row, label: row.label === "true" ? messages.yes : messages.no })),
+            }
+          : classification,
+      );
   }
 
   /** Adds the objects in view to the classes, now and after each movement: reads the shards with their values. */
   async #follow(map: map, info: AttributeInfo, { shard_size, shards }: ColumnSummary, { add }: Classification): Promise<void> {
     const read = new Set<number>();
     const follow = async (): Promise<void> => {
-      const seen = new Set((await map.objectsInView(true)).flatMap(({ id, layer }) => (layer === this.#layer ? Math.floor(id / shard_size) : [])));
+      const seen = new Set(
+        (await map.objectsInView(true)).flatMap(({ id, layer }) => (layer === this.#layer ? Math.floor(id / shard_size) : [])),
+      );
       const missing = shards.filter((shard) => seen.has(shard) && !read.has(shard));
       if (missing.length === 0) return;
       for (const shard of missing) read.add(shard);
       try {
-        add(await this.#layer.column(info, missing.map((shard) => shard * shard_size)));
+        add(
+          await this.#layer.column(
+            info,
+            missing.map((shard) => shard * shard_size),
+          ),
+        );
       } catch (reason) {
         for (const shard of missing) read.delete(shard);
         throw reason;
@@ -119,7 +135,13 @@ export class theme extends MapLayer<map, ThemeEvents> {
       if (this.map === map) this.#applyStyle(this.#pressed);
     };
     await follow();
-    if (this.map === map) map.on("moveend", (this.#onMoveEnd = () => { this.#run(map, follow()); }));
+    if (this.map === map)
+      map.on(
+        "moveend",
+        (this.#onMoveEnd = () => {
+          this.#run(map, follow());
+        }),
+      );
   }
 
   async #findAttribute(): Promise<AttributeInfo> {
@@ -134,7 +156,9 @@ export class theme extends MapLayer<map, ThemeEvents> {
     this.#applyStyle(this.#pressed);
     const { legend } = this.options;
     if (legend !== null) {
-      this.#legend = new Legend(this.title, classification, (chosen) => { this.#applyStyle(chosen); });
+      this.#legend = new Legend(this.title, classification, (chosen) => {
+        this.#applyStyle(chosen);
+      });
       (legend ?? map.overlayPane).append(this.#legend.box);
     }
     this.fire("ready", { classes: this.#classes });

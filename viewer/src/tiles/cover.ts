@@ -68,7 +68,9 @@ export interface TileFallback {
 export function findFallbacks(tile: Tile, ready: (tile: Tile) => boolean, occupied: (tile: Tile) => boolean, down = 2): TileFallback[] {
   if (ready(tile)) return [{ area: tile, from: tile }];
   if (down > 0 && hasReadyBelow(tile, ready, occupied, down)) {
-    return childrenOf(tile).filter(occupied).flatMap((child) => findFallbacks(child, ready, occupied, down - 1));
+    return childrenOf(tile)
+      .filter(occupied)
+      .flatMap((child) => findFallbacks(child, ready, occupied, down - 1));
   }
   for (let up = 1; up <= tile.z; up++) {
     const from = ancestor(tile, up);

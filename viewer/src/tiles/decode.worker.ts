@@ -1,7 +1,10 @@
 import type { DecodeRequest, DecodeResponse } from "./decodeMessages";
 import { decodeTile, listTransferables } from "./tileData";
 
-const scope = self as unknown as { onmessage: (event: MessageEvent<DecodeRequest>) => void; postMessage: (response: DecodeResponse, transfer: Transferable[]) => void };
+const scope = self as unknown as {
+  onmessage: (event: MessageEvent<DecodeRequest>) => void;
+  postMessage: (response: DecodeResponse, transfer: Transferable[]) => void;
+};
 
 scope.onmessage = ({ data: { id, kind, mediaType, bytes, below } }) => {
   decodeTile(kind, mediaType, bytes, below).then(

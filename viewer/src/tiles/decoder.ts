@@ -55,7 +55,9 @@ export class Decoder {
       this.#settle(data);
     };
     worker.onerror = (event) => {
-      this.#rejectAll(`cannot run the tile decoder: ${event.message || "the worker is blocked; add worker-src blob: to the page's Content-Security-Policy"}`);
+      this.#rejectAll(
+        `cannot run the tile decoder: ${event.message || "the worker is blocked; add worker-src blob: to the page's Content-Security-Policy"}`,
+      );
     };
     this.#workers.push(worker);
     return worker;
@@ -66,7 +68,10 @@ export class Decoder {
     this.#pending.delete(response.id);
     if ("error" in response) pending?.reject(new DecodeError(response.error));
     else pending?.resolve(response.data);
-    if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => { this.#endWorkers(); }, IDLE_MS);
+    if (this.#pending.size === 0)
+      this.#idleTimer = setTimeout(() => {
+        this.#endWorkers();
+      }, IDLE_MS);
   }
 
   #rejectAll(message: string): void {

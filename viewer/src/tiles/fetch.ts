@@ -38,7 +38,11 @@ export async function fetchJson(urls: readonly string[], options: FetchOptions =
 }
 
 /** @param reload bypasses the browser's cache, which may be the cause of the failure */
-async function fetchOnce(url: string, { signal, range, fetch: request = fetch }: FetchOptions, reload: boolean): Promise<ArrayBuffer | null> {
+async function fetchOnce(
+  url: string,
+  { signal, range, fetch: request = fetch }: FetchOptions,
+  reload: boolean,
+): Promise<ArrayBuffer | null> {
   const headers: HeadersInit = range ? { Range: `bytes=${String(range[0])}-${String(range[0] + range[1] - 1)}` } : {};
   let response: Response;
   try {
@@ -48,7 +52,11 @@ async function fetchOnce(url: string, { signal, range, fetch: request = fetch }:
   }
   if (response.status === 204) return null;
   if (!response.ok) throw new FetchError(`${url}: HTTP ${String(response.status)}`, response.status);
-  if (range && response.status !== 206) throw new FetchError(`${url}: the server ignores range requests (HTTP ${String(response.status)}, expected 206); use nginx, Apache or Caddy`, response.status);
+  if (range && response.status !== 206)
+    throw new FetchError(
+      `${url}: the server ignores range requests (HTTP ${String(response.status)}, expected 206); use nginx, Apache or Caddy`,
+      response.status,
+    );
   const bytes = await response.arrayBuffer();
   // Chromium's cache may end a range early, after another request for it was aborted. The first range may be longer than the file.
   if (range?.[0] && bytes.byteLength !== range[1]) throw new FetchError(`${url}: ${String(bytes.byteLength)} of ${String(range[1])} bytes`);

@@ -37,7 +37,8 @@ interface Failure {
 }
 
 /** Computes when to try again after a number of failures; without a network, never: see `clearFailures`. */
-const computeRetry = (first_ms: number, count: number): number => (isOffline() ? Infinity : performance.now() + Math.min(first_ms * 2 ** (count - 1), LONGEST_WAIT_MS));
+const computeRetry = (first_ms: number, count: number): number =>
+  isOffline() ? Infinity : performance.now() + Math.min(first_ms * 2 ** (count - 1), LONGEST_WAIT_MS);
 
 /** Fetches, decodes and keeps the tiles of one image layer. */
 export class LayerTiles {
@@ -115,7 +116,10 @@ export class LayerTiles {
     if (this.#isSilent) throw new FetchError(`${this.key(view, layer, tile)}: the server does not answer`);
     await this.#resources.queue.runNow(this.makeRequest(view, layer, tile));
     const loaded = this.get(view, layer, tile);
-    if (!loaded) throw this.#failed.get(this.key(view, layer, tile))?.error ?? new FetchError(`${this.key(view, layer, tile)}: the request was aborted`);
+    if (!loaded)
+      throw (
+        this.#failed.get(this.key(view, layer, tile))?.error ?? new FetchError(`${this.key(view, layer, tile)}: the request was aborted`)
+      );
     return loaded.data;
   }
 
@@ -131,12 +135,18 @@ export class LayerTiles {
       const [bytes, decoded] = found && "kind" in found ? [null, found] : [found, null];
       const transfer = known?.transfer ?? { bytes: bytes?.byteLength ?? 0, at_ms: performance.now() }; // the bytes move to another thread
       const packed = bytes && (above ?? layer.media_type === DATA_TYPE) ? bytes : undefined;
-      const data = bytes ? await this.#resources.decoder.decode(layer.kind, layer.media_type, bytes, packed !== undefined, above && tile) : decoded;
+      const data = bytes
+        ? await this.#resources.decoder.decode(layer.kind, layer.media_type, bytes, packed !== undefined, above && tile)
+        : decoded;
       if (signal.aborted) {
         if (data && "bitmap" in data) data.bitmap.close();
         return;
       }
-      this.#resources.cache.set(key, { data, empty: !data, transfer, packed }, data ? computeBytes(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) + (packed?.byteLength ?? 0) : 64);
+      this.#resources.cache.set(
+        key,
+        { data, empty: !data, transfer, packed },
+        data ? computeBytes(data) * (data.kind === "id" || data.kind === "depth" ? 2 : 1) + (packed?.byteLength ?? 0) : 64,
+      );
       this.#failed.delete(key);
       this.#silence = { tries: 0, retry_ms: 0 };
       if (!isAhead()) this.#onArrival(null);
@@ -146,7 +156,8 @@ export class LayerTiles {
       const error = reason instanceof DecodeError ? new DecodeError(`${name}: ${reason.message}`) : asError(reason);
       const count = (this.#failed.get(key)?.count ?? 0) + 1;
       this.#failed.set(key, { error, count, retry_ms: computeRetry(TILE_WAIT_MS, count) });
-      if (error instanceof FetchError && error.status === 0 && !hasServiceWorker() && tries === this.#silence.tries) this.#waitForServer(tries + 1);
+      if (error instanceof FetchError && error.status === 0 && !hasServiceWorker() && tries === this.#silence.tries)
+        this.#waitForServer(tries + 1);
       // The same cause has many messages, which differ by URL.
       const cause = error.name + error.message.replace(/\S*\/\S*/g, "");
       const silent = isAhead() || this.#reported.has(cause);
@@ -159,7 +170,9 @@ export class LayerTiles {
 
   /** Finds a tile that keeps the bytes of `tile`, or of the one above it that is fetched in its place. */
   #findPacked(view: View, layer: LayerInfo, tile: Tile, above: Tile | undefined): CachedTile | undefined {
-    const keys = above ? childrenOf(above).map((child) => this.key(view, layer, child)) : DATA_KINDS.map((kind) => this.key(view, { ...layer, kind }, tile));
+    const keys = above
+      ? childrenOf(above).map((child) => this.key(view, layer, child))
+      : DATA_KINDS.map((kind) => this.key(view, { ...layer, kind }, tile));
     return keys.map((key) => this.#resources.cache.peek(key)).find((known) => known?.packed);
   }
 
@@ -174,7 +187,9 @@ export class LayerTiles {
         if (signal.aborted || asError(reason).name !== "AbortError") throw reason;
       }
     }
-    const own = this.#source.tile(view, layer, tile, signal).finally(() => { this.#fetching.delete(key); });
+    const own = this.#source.tile(view, layer, tile, signal).finally(() => {
+      this.#fetching.delete(key);
+    });
     this.#fetching.set(key, own);
     return own;
   }
@@ -183,9 +198,13 @@ export class LayerTiles {
   #waitForServer(tries: number): void {
     const retry_ms = computeRetry(SERVER_WAIT_MS, tries);
     this.#silence = { tries, retry_ms };
-    if (retry_ms < Infinity) setTimeout(() => { this.#onArrival(null); }, retry_ms - performance.now());
+    if (retry_ms < Infinity)
+      setTimeout(() => {
+        this.#onArrival(null);
+      }, retry_ms - performance.now());
   }
 }
 
 /** Finds the tile above that is fetched in place of a tile: on dense screens, that of light, which has a quarter of the bytes for the same area. */
-const findAbove = ({ kind }: LayerInfo, tile: Tile): Tile | undefined => (LIGHT_KINDS.includes(kind) && tile.z > 0 && devicePixelRatio >= DENSE_DPR ? ancestor(tile, 1) : undefined);
+const findAbove = ({ kind }: LayerInfo, tile: Tile): Tile | undefined =>
+  LIGHT_KINDS.includes(kind) && tile.z > 0 && devicePixelRatio >= DENSE_DPR ? ancestor(tile, 1) : undefined;

@@ -78,7 +78,14 @@ const MAX_PAGES = 4;
 
 /** Returns the words of a text: letters and digits, in lower case without accents, so that "strasse" matches "Straße" and "cafe" matches "Café". */
 export function searchWords(text: string): string[] {
-  return text.toLowerCase().replaceAll("ß", "ss").normalize("NFD").replace(/\p{M}/gu, "").match(/[\p{L}\p{N}]+/gu) ?? [];
+  return (
+    text
+      .toLowerCase()
+      .replaceAll("ß", "ss")
+      .normalize("NFD")
+      .replace(/\p{M}/gu, "")
+      .match(/[\p{L}\p{N}]+/gu) ?? []
+  );
 }
 
 /** Reads objects' attributes by id; fetches them by shards. */
@@ -129,12 +136,21 @@ export class Objects {
         }
         if (entries) count++;
         let k = Math.max(keys.filter((key) => key < start).length - 1, 0);
-        for (const first = k; k < pages.length && (k === first || keys[k]?.startsWith(start)) && count < MAX_PAGES && found.size < limit; k++) await read(pathBelow(path, pages[k] as string));
+        for (
+          const first = k;
+          k < pages.length && (k === first || keys[k]?.startsWith(start)) && count < MAX_PAGES && found.size < limit;
+          k++
+        )
+          await read(pathBelow(path, pages[k] as string));
       };
       await read(path);
     }
-    const rank = (label: string): number => 2 * Number(!` ${label}`.includes(` ${words.join(" ")}`)) + Number(!label.startsWith(words[0] ?? ""));
-    return [...found.values()].sort(([a], [b]) => rank(a) - rank(b) || (a < b ? -1 : 1)).slice(0, limit).map(([, entry]) => entry);
+    const rank = (label: string): number =>
+      2 * Number(!` ${label}`.includes(` ${words.join(" ")}`)) + Number(!label.startsWith(words[0] ?? ""));
+    return [...found.values()]
+      .sort(([a], [b]) => rank(a) - rank(b) || (a < b ? -1 : 1))
+      .slice(0, limit)
+      .map(([, entry]) => entry);
   }
 
   /** Returns all attributes; none when the rendering does not list them. */
@@ -154,7 +170,11 @@ export class Objects {
   async column(name: string, ids?: Iterable<number>): Promise<ReadonlyMap<number, AttributeValue>> {
     const file = await this.#fetchColumn(name);
     const parts = file && "shards" in file ? await Promise.all(this.#fetchColumnShards(name, file, ids)) : [file];
-    return new Map(parts.flatMap((part) => (part?.ids ?? []).slice(0, part?.values.length).map((id, k) => [id, part?.values[k] as AttributeValue] as const)));
+    return new Map(
+      parts.flatMap((part) =>
+        (part?.ids ?? []).slice(0, part?.values.length).map((id, k) => [id, part?.values[k] as AttributeValue] as const),
+      ),
+    );
   }
 
   #columnPath(name: string): string {
@@ -162,18 +182,24 @@ export class Objects {
   }
 
   #fetchColumn(name: string): Promise<Column | ColumnSummary | null> {
-    return /^[0-9a-f]{16}$/.test(name) && this.#columnPath(name) ? this.#fetchOnce(this.#columnPath(name), "column", 2) : Promise.resolve(null);
+    return /^[0-9a-f]{16}$/.test(name) && this.#columnPath(name)
+      ? this.#fetchOnce(this.#columnPath(name), "column", 2)
+      : Promise.resolve(null);
   }
 
   #fetchColumnShards(name: string, { shards, shard_size }: ColumnSummary, ids?: Iterable<number>): Promise<Column | null>[] {
     const chosen = new Set(ids && Array.from(ids, (id) => Math.floor(id / shard_size)));
-    return shards.filter((shard) => !ids || chosen.has(shard)).map((shard) => this.#fetchOnce<Column>(pathBelow(this.#columnPath(name), shard), "column"));
+    return shards
+      .filter((shard) => !ids || chosen.has(shard))
+      .map((shard) => this.#fetchOnce<Column>(pathBelow(this.#columnPath(name), shard), "column"));
   }
 
   #fetchShard(number: number, template: string): Promise<Shard> {
     const known = this.#shards.get(number);
     if (known) return known;
-    const shard = this.#fetch<{ objects: Shard }>(template.replace("{shard}", String(number)), "objects").then((file) => file?.objects ?? {});
+    const shard = this.#fetch<{ objects: Shard }>(template.replace("{shard}", String(number)), "objects").then(
+      (file) => file?.objects ?? {},
+    );
     this.#shards.set(number, shard);
     shard.catch(() => this.#shards.delete(number));
     const oldest = this.#shards.keys().next();
@@ -194,7 +220,11 @@ export class Objects {
   /** Fetches a file; null when it does not exist. @param version the newest one that can be read */
   async #fetch<T>(path: string, type: string, version = 1): Promise<T | null> {
     const file = (await this.#source.json(path)) as { map3d?: string; version?: number } | null;
-    if (file && (file.map3d !== type || !(Number(file.version) <= version))) throw new FetchError(`${path}: expected map3d "${type}" version ${String(version)}, got "${String(file.map3d)}" version ${String(file.version)}`, 200);
+    if (file && (file.map3d !== type || !(Number(file.version) <= version)))
+      throw new FetchError(
+        `${path}: expected map3d "${type}" version ${String(version)}, got "${String(file.map3d)}" version ${String(file.version)}`,
+        200,
+      );
     return file as T | null;
   }
 }

@@ -71,7 +71,8 @@ export class Archive {
       const bytes = await this.#read(0, FIRST_READ_BYTES);
       const header = readHeader(bytes, this.#name);
       const [offset, length] = header.root;
-      if (offset + length <= bytes.byteLength) void this.#parseDirectory(header, offset, Promise.resolve(bytes.slice(offset, offset + length)));
+      if (offset + length <= bytes.byteLength)
+        void this.#parseDirectory(header, offset, Promise.resolve(bytes.slice(offset, offset + length)));
       return header;
     } catch (reason) {
       this.#header = undefined;
@@ -92,7 +93,8 @@ export class Archive {
 
   async #decompress(bytes: ArrayBuffer, compression: number): Promise<ArrayBuffer> {
     if (compression <= 1) return bytes;
-    if (compression !== 2) throw new FetchError(`${this.#name}: unsupported compression ${String(compression)}; expected 1 (none) or 2 (gzip)`);
+    if (compression !== 2)
+      throw new FetchError(`${this.#name}: unsupported compression ${String(compression)}; expected 1 (none) or 2 (gzip)`);
     return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
   }
 }

@@ -33,14 +33,20 @@ export class RequestQueue {
   /** Replaces the wanted requests, most urgent first. @param ahead requests that run when there are no others */
   setRequests(requests: readonly TileRequest[], ahead: readonly TileRequest[] = []): void {
     const keys = new Map([...requests, ...ahead].reverse().map((request) => [request.key, request]));
-    const [wanted, later] = [requests, ahead].map((list) => list.filter((request) => keys.get(request.key) === request)) as [TileRequest[], TileRequest[]];
+    const [wanted, later] = [requests, ahead].map((list) => list.filter((request) => keys.get(request.key) === request)) as [
+      TileRequest[],
+      TileRequest[],
+    ];
     for (const [key, running] of [...this.#running]) {
       running.ahead = later.some((request) => request.key === key);
       if (keys.has(key) || running.pinned) continue;
       this.#running.delete(key);
       running.abort.abort();
     }
-    [this.#waiting, this.#ahead] = [wanted, later].map((list) => list.filter(({ key }) => !this.#running.has(key))) as [TileRequest[], TileRequest[]];
+    [this.#waiting, this.#ahead] = [wanted, later].map((list) => list.filter(({ key }) => !this.#running.has(key))) as [
+      TileRequest[],
+      TileRequest[],
+    ];
     this.#fill();
   }
 
@@ -64,10 +70,12 @@ export class RequestQueue {
 
   #start(request: TileRequest, ahead = false): RunningRequest {
     const abort = new AbortController();
-    const done = request.run(abort.signal, () => running.ahead).finally(() => {
-      if (this.#running.get(request.key) === running) this.#running.delete(request.key);
-      this.#fill();
-    });
+    const done = request
+      .run(abort.signal, () => running.ahead)
+      .finally(() => {
+        if (this.#running.get(request.key) === running) this.#running.delete(request.key);
+        this.#fill();
+      });
     const running: RunningRequest = { abort, done, pinned: false, ahead };
     this.#running.set(request.key, running);
     return running;

@@ -26,7 +26,8 @@ export class HttpSource implements Source {
   /** @param fetch replaces the browser's fetch  @throws UsageError without a URL */
   constructor(urls: string | readonly string[], fetch?: FetchFunction) {
     const list = (typeof urls === "string" ? [urls] : Array.isArray(urls) ? urls : []) as string[];
-    if (list.length === 0 || !list.every((url) => typeof url === "string" && url !== "")) throw new UsageError("an imageLayer needs at least one base URL, e.g. \"https://host/tiles/teatime\"");
+    if (list.length === 0 || !list.every((url) => typeof url === "string" && url !== ""))
+      throw new UsageError('an imageLayer needs at least one base URL, e.g. "https://host/tiles/teatime"');
     this.bases = list.map((url) => normalizeBaseUrl(url, document.baseURI));
     this.#fetch = fetch;
   }

@@ -38,10 +38,16 @@ async function decodeWhole(kind: string, mediaType: string, bytes: ArrayBuffer):
   if (!CHANNELS[kind]) return decodeColor(kind as "color" | "picture", mediaType, bytes);
   if (mediaType === DATA_TYPE) return (await decodeDataTile(new Uint8Array(bytes), kind as DataKind)) as TileData;
   const { width, height, channels, data } = await decodePng(new Uint8Array(bytes));
-  if (channels !== CHANNELS[kind]) throw new DecodeError(`${kind} tiles have ${String(CHANNELS[kind])} bytes per pixel, got ${String(channels)}`);
+  if (channels !== CHANNELS[kind])
+    throw new DecodeError(`${kind} tiles have ${String(CHANNELS[kind])} bytes per pixel, got ${String(channels)}`);
   // The values are little-endian, as memory is on every machine that runs a browser.
   const { buffer, byteOffset, byteLength } = data;
-  const values = channels > 3 ? new Uint32Array(buffer, byteOffset, byteLength / 4) : channels === 2 ? new Uint16Array(buffer, byteOffset, byteLength / 2) : data;
+  const values =
+    channels > 3
+      ? new Uint32Array(buffer, byteOffset, byteLength / 4)
+      : channels === 2
+        ? new Uint16Array(buffer, byteOffset, byteLength / 2)
+        : data;
   return { kind, width, height, values } as TileData;
 }
 

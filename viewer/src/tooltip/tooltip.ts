@@ -13,12 +13,15 @@ export function bindTooltip(layer: imageLayer, content: TooltipContent, getPane:
   };
   const over = ({ id }: { id: number }): void => {
     shown = id;
-    void layer.object(id).catch(() => null).then((object) => {
-      const text = object && (typeof content === "string" ? content : content(object, id));
-      if (shown !== id || text === null || text === "") return;
-      box.replaceChildren(text);
-      getPane()?.append(box);
-    });
+    void layer
+      .object(id)
+      .catch(() => null)
+      .then((object) => {
+        const text = object && (typeof content === "string" ? content : content(object, id));
+        if (shown !== id || text === null || text === "") return;
+        box.replaceChildren(text);
+        getPane()?.append(box);
+      });
   };
   const move = ({ point: [x, y] }: { point: readonly [number, number] }): void => {
     box.style.transform = `translate(${String(x)}px, ${String(y)}px)`;

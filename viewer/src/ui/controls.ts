@@ -61,7 +61,11 @@ function createZoomGroup(map: ControlledMap, messages: MapMessages): HTMLElement
 }
 
 function createRotateGroup(map: ControlledMap, messages: MapMessages): HTMLElement {
-  const [left, right, compass] = [iconButton("", messages.rotateLeft, LEFT), iconButton("", messages.rotateRight, RIGHT), createCompass(messages)];
+  const [left, right, compass] = [
+    iconButton("", messages.rotateLeft, LEFT),
+    iconButton("", messages.rotateRight, RIGHT),
+    createCompass(messages),
+  ];
   const group = element("div", "map3d-group", { role: "group", "aria-label": messages.direction }, compass, left, right);
   left.addEventListener("click", () => map.rotate(1));
   right.addEventListener("click", () => map.rotate(-1));

@@ -22,7 +22,12 @@ async function violations(page: Page): Promise<string[]> {
   const found = await page.evaluate(async () => {
     const { axe } = globalThis as unknown as { axe: { run(context: Document, options: object): Promise<AxeResults> } };
     const { violations, passes } = await axe.run(document, { runOnly: ["wcag2a", "wcag2aa"] });
-    return { passes: passes.length, violations: violations.flatMap(({ id, nodes }) => nodes.map(({ target, failureSummary }) => `${id}: ${target.join(" ")}: ${failureSummary ?? ""}`)) };
+    return {
+      passes: passes.length,
+      violations: violations.flatMap(({ id, nodes }) =>
+        nodes.map(({ target, failureSummary }) => `${id}: ${target.join(" ")}: ${failureSummary ?? ""}`),
+      ),
+    };
   });
   expect(found.passes).toBeGreaterThan(10);
   return found.violations;
@@ -40,7 +45,9 @@ test.each(Object.entries(DEVICES))("%s: axe-core finds no violation of WCAG 2 A 
   await page.locator("#more").click();
   await look("settings");
   await page.locator("#more").click();
-  await page.evaluate((id) => { location.hash = `${location.hash.split("/id=")[0] ?? ""}/id=${String(id)}`; }, THINGS[1]?.id ?? 0);
+  await page.evaluate((id) => {
+    location.hash = `${location.hash.split("/id=")[0] ?? ""}/id=${String(id)}`;
+  }, THINGS[1]?.id ?? 0);
   await page.waitForSelector("#info:not([hidden])");
   await look("card");
   await page.locator("#make-picture").click();
@@ -53,6 +60,8 @@ test("axe-core finds a control without a name", async () => {
   const { page } = await bed.openPage(DEVICES.desk);
   await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
   await page.waitForSelector("#tools:not([hidden])");
-  await page.evaluate(() => { document.querySelector("#tools")?.append(document.createElement("button")); });
+  await page.evaluate(() => {
+    document.querySelector("#tools")?.append(document.createElement("button"));
+  });
   expect((await violations(page)).filter((text) => text.startsWith("button-name"))).toHaveLength(1);
 });

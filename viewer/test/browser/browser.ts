@@ -17,8 +17,23 @@ export type Way = keyof typeof WAYS;
 
 /** Opens Chromium with software WebGL2. Path: CHROMIUM, else Debian's. */
 async function openBrowser(way: Way): Promise<Browser> {
-  const args = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", ...WAYS[way].args];
-  return chromium.launch({ executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium", headless: true, args, env: { ...process.env, ...WAYS[way].env } });
+  const args = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    ...WAYS[way].args,
+  ];
+  return chromium.launch({
+    executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
+    headless: true,
+    args,
+    env: { ...process.env, ...WAYS[way].env },
+  });
 }
 
 /** The browsers of this process, which all its test files share. They end with it. */
@@ -43,7 +58,10 @@ export async function closePages(): Promise<void> {
 
 /** Hides that these browsers have no GPU, so that maps use WebGL as they do for most users. */
 function anyWebGL(): void {
-  const own = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (kind: string, options?: object) => unknown;
+  const own = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (
+    kind: string,
+    options?: object,
+  ) => unknown;
   HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, options?: object) {
     return own.call(this, kind, options && { ...options, failIfMajorPerformanceCaveat: false });
   } as typeof HTMLCanvasElement.prototype.getContext;
@@ -92,10 +110,17 @@ export async function loaded(page: Page): Promise<void> {
 /** Waits until the maps of a ready-made page are drawn, and nothing moves or loads. */
 export async function resting(page: Page): Promise<void> {
   for (let calm = 0; calm < 2;) {
-    const drawn = await page.evaluate(() => new Promise<boolean>((done) => {
-      const { maps } = globalThis as unknown as { maps: Set<{ loaded(): boolean }> };
-      requestAnimationFrame(() => setTimeout(() => { done(maps.size > 0 && [...maps].every((map) => map.loaded())); }, 30));
-    }));
+    const drawn = await page.evaluate(
+      () =>
+        new Promise<boolean>((done) => {
+          const { maps } = globalThis as unknown as { maps: Set<{ loaded(): boolean }> };
+          requestAnimationFrame(() =>
+            setTimeout(() => {
+              done(maps.size > 0 && [...maps].every((map) => map.loaded()));
+            }, 30),
+          );
+        }),
+    );
     calm = drawn && waiting.get(page)?.size === 0 ? calm + 1 : 0;
   }
 }
@@ -114,7 +139,10 @@ export interface PageOptions {
 }
 
 /** Opens a page and collects its errors and console errors. `closePages` closes it. */
-export async function openPage(options: BrowserContextOptions = {}, { way = "plain", draws = true, maps = false, opening = false }: PageOptions = {}): Promise<{ page: Page; problems: string[] }> {
+export async function openPage(
+  options: BrowserContextOptions = {},
+  { way = "plain", draws = true, maps = false, opening = false }: PageOptions = {},
+): Promise<{ page: Page; problems: string[] }> {
   const browser = await browserOf(way);
   const context = await browser.newContext({ viewport: { width: 800, height: 600 }, ...options });
   opened.add(context);

@@ -15,7 +15,20 @@ const bed = new TestBed({ town, ramp: renderRamp(), opaque: opaque(town), broken
 /** The town with colour without alpha, like JPEG. */
 function opaque({ json, files, raw }: Fixture): Fixture {
   const layers = json.layers.map((layer) => (layer.kind === "color" ? { ...layer, format: "jpeg" } : layer));
-  const filled = [...raw].filter(([path]) => path.includes("/color/")).map(([path, bytes]) => [path, encodePng(128, 128, 4, bytes.map((value, at) => (at % 4 === 3 ? 255 : value)))] as const);
+  const filled = [...raw]
+    .filter(([path]) => path.includes("/color/"))
+    .map(
+      ([path, bytes]) =>
+        [
+          path,
+          encodePng(
+            128,
+            128,
+            4,
+            bytes.map((value, at) => (at % 4 === 3 ? 255 : value)),
+          ),
+        ] as const,
+    );
   return { json: { ...json, layers }, files: new Map([...files, ...filled]), raw };
 }
 
@@ -48,7 +61,10 @@ function differenceOf(a: Buffer, b: Buffer): Difference {
 async function both(name: string, options: object = {}, layer: object = {}, deviceScaleFactor = 1): Promise<Page[]> {
   const pages: Page[] = [];
   for (const drawer of ["webgl", "canvas"]) {
-    const { page, problems } = await bed.start(name, { zoom: 3, drawer, maxPixelRatio: deviceScaleFactor, ...options }, layer, { deviceScaleFactor, viewport: VIEWPORT });
+    const { page, problems } = await bed.start(name, { zoom: 3, drawer, maxPixelRatio: deviceScaleFactor, ...options }, layer, {
+      deviceScaleFactor,
+      viewport: VIEWPORT,
+    });
     expect(problems).toEqual([]);
     expect(await page.evaluate(() => (globalThis as Global).map.drawer)).toBe(drawer);
     pages.push(page);
@@ -82,7 +98,11 @@ describe("if a tile pixel is a device pixel, both drawers agree except for round
 
   test("with another light, and without light", async () => {
     const pages = await both("town");
-    for (const light of [{ azimuth_deg: 20, altitude_deg: 10, ambient: 0.1, diffuse: 3 }, { azimuth_deg: 200, diffuse: 0 }, { lit: false }]) {
+    for (const light of [
+      { azimuth_deg: 20, altitude_deg: 10, ambient: 0.1, diffuse: 3 },
+      { azimuth_deg: 200, diffuse: 0 },
+      { lit: false },
+    ]) {
       expect((await compared(pages, (given) => (globalThis as Global).map.setLight(given), light)).most).toBeLessThanOrEqual(1.01);
     }
   });
@@ -95,7 +115,8 @@ describe("if a tile pixel is a device pixel, both drawers agree except for round
 
   test("with a translucent second layer", async () => {
     const pages = await both("town");
-    const add = (url: string): unknown => new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.4 }).addTo((globalThis as Global).map);
+    const add = (url: string): unknown =>
+      new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.4 }).addTo((globalThis as Global).map);
     expect((await compared(pages, add, bed.url("opaque"))).most).toBeLessThanOrEqual(2.01);
     await pages[1]?.screenshot({ path: `${OUT}/canvas-layers.png` });
   });
@@ -110,7 +131,10 @@ describe("at fractional zooms", () => {
   test.each([1, 2, 3])("both drawers agree except for edges at pixel ratio %i", async (dpr) => {
     const pages = await both("town", {}, {}, dpr);
     for (const mode of ["lit", "id"]) {
-      await settledAll(pages, mode === "lit" ? () => (globalThis as Global).layer.setMode("lit") : () => (globalThis as Global).layer.setMode("id"));
+      await settledAll(
+        pages,
+        mode === "lit" ? () => (globalThis as Global).layer.setMode("lit") : () => (globalThis as Global).layer.setMode("id"),
+      );
       for (const zoom of dpr === 3 ? [2.6] : [1.8, 2.6, 3.45, 4.7]) {
         const { most, off } = await compared(pages, setZoom, zoom);
         expect(off, `${mode} at ${String(zoom)}`).toBeLessThan(mode === "lit" ? 0.03 : 0.002);
@@ -120,8 +144,19 @@ describe("at fractional zooms", () => {
     await pages[1]?.screenshot({ path: `${OUT}/canvas-between-${String(dpr)}.png` });
   });
 
-  test.each([[4, 1, 2.4], [3.37, 1, 3.4], [2.5, 1, 6.2], [2.71, 2, 4], [3.9, 3, 2]])("at zoom %d and pixel ratio %i no seam is visible between tiles", async (zoom, dpr, most) => {
-    const { page } = await bed.start("ramp", { zoom, light: { lit: false }, drawer: "canvas", maxPixelRatio: dpr }, {}, { deviceScaleFactor: dpr });
+  test.each([
+    [4, 1, 2.4],
+    [3.37, 1, 3.4],
+    [2.5, 1, 6.2],
+    [2.71, 2, 4],
+    [3.9, 3, 2],
+  ])("at zoom %d and pixel ratio %i no seam is visible between tiles", async (zoom, dpr, most) => {
+    const { page } = await bed.start(
+      "ramp",
+      { zoom, light: { lit: false }, drawer: "canvas", maxPixelRatio: dpr },
+      {},
+      { deviceScaleFactor: dpr },
+    );
     const got = await picture(page);
     const width = 800 * dpr;
     let steepest = 0;
@@ -147,7 +182,11 @@ test("ancestors and descendants replace tiles that cannot be fetched", async () 
 
 describe("the drawer", () => {
   const withoutWebGL = (): void => {
-    const original = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (this: HTMLCanvasElement, kind: string, ...rest: unknown[]) => null;
+    const original = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (
+      this: HTMLCanvasElement,
+      kind: string,
+      ...rest: unknown[]
+    ) => null;
     HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, ...rest: unknown[]): null {
       return kind === "webgl2" ? null : original.call(this, kind, ...rest);
     };
@@ -155,14 +194,19 @@ describe("the drawer", () => {
 
   /** Imitates browsers whose WebGL runs on the CPU. */
   const slowly = (): void => {
-    const original = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (this: HTMLCanvasElement, kind: string, options?: object) => null;
+    const original = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (
+      this: HTMLCanvasElement,
+      kind: string,
+      options?: object,
+    ) => null;
     HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, options?: WebGLContextAttributes): null {
       return options?.failIfMajorPerformanceCaveat === true ? null : original.call(this, kind, options);
     };
   };
 
   const named = (): void => {
-    WebGL2RenderingContext.prototype.getParameter = () => "ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (LLVM 10.0.0)), SwiftShader driver)";
+    WebGL2RenderingContext.prototype.getParameter = () =>
+      "ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (LLVM 10.0.0)), SwiftShader driver)";
   };
 
   test.each([
@@ -176,13 +220,23 @@ describe("the drawer", () => {
     const { page } = await bed.openPage();
     await page.addInitScript(script);
     await page.goto(`${bed.server.origin}/bare`);
-    const got = await page.evaluate(([base, drawer]) => new Promise<{ name: string | null; message: string }>((done) => {
-      const g = globalThis as Global;
-      const map = new g.map3d.map("mapcanvas", { drawer: drawer as "auto" });
-      const layer = new g.map3d.imageLayer(base).addTo(map);
-      map.once("idle", () => { done({ name: map.drawer, message: "" }); }).on("error", ({ error }) => { done({ name: map.drawer, message: error.message }); });
-      return layer;
-    }), [bed.url("town"), drawer] as const);
+    const got = await page.evaluate(
+      ([base, drawer]) =>
+        new Promise<{ name: string | null; message: string }>((done) => {
+          const g = globalThis as Global;
+          const map = new g.map3d.map("mapcanvas", { drawer: drawer as "auto" });
+          const layer = new g.map3d.imageLayer(base).addTo(map);
+          map
+            .once("idle", () => {
+              done({ name: map.drawer, message: "" });
+            })
+            .on("error", ({ error }) => {
+              done({ name: map.drawer, message: error.message });
+            });
+          return layer;
+        }),
+      [bed.url("town"), drawer] as const,
+    );
     expect(got.name).toBe(name);
     expect(got.message).toMatch(message);
   });
@@ -209,10 +263,12 @@ describe("the drawer", () => {
     await page.mouse.up();
     await page.evaluate(() => new Promise((done) => (globalThis as Global).map.once("idle", done).setLight({})));
     expect(differenceOf(before, await picture(page)).off).toBeGreaterThan(0.01);
-    expect(await page.evaluate(() => {
-      (globalThis as Global).map.remove();
-      return document.querySelector("#mapcanvas")?.parentElement === document.body;
-    })).toBe(true);
+    expect(
+      await page.evaluate(() => {
+        (globalThis as Global).map.remove();
+        return document.querySelector("#mapcanvas")?.parentElement === document.body;
+      }),
+    ).toBe(true);
     expect(problems.filter((text) => !/WebGL|CONTEXT_LOST/i.test(text))).toEqual([]);
   });
 });
@@ -231,44 +287,59 @@ test("picks are exact", async () => {
 
 test("an idle map draws no frames and sends no messages to workers", async () => {
   const { page } = await bed.start("town", { drawer: "canvas", dataSaver: true });
-  const counts = await page.evaluate(() => new Promise<{ resting: number; moving: number }>((done) => {
-    let count = 0;
-    const [request, post] = [globalThis.requestAnimationFrame.bind(globalThis), Object.getOwnPropertyDescriptor(Worker.prototype, "postMessage")?.value as Worker["postMessage"]];
-    globalThis.requestAnimationFrame = (call) => {
-      count++;
-      return request(call);
-    };
-    Worker.prototype.postMessage = function (this: Worker, ...given: unknown[]): void {
-      count++;
-      post.apply(this, given as Parameters<typeof post>);
-    };
-    setTimeout(() => {
-      const resting = count;
-      const { map } = globalThis as Global;
-      map.once("idle", () => { done({ resting, moving: count }); }).setLight({ azimuth_deg: 10 });
-    }, 1000);
-  }));
+  const counts = await page.evaluate(
+    () =>
+      new Promise<{ resting: number; moving: number }>((done) => {
+        let count = 0;
+        const [request, post] = [
+          globalThis.requestAnimationFrame.bind(globalThis),
+          Object.getOwnPropertyDescriptor(Worker.prototype, "postMessage")?.value as Worker["postMessage"],
+        ];
+        globalThis.requestAnimationFrame = (call) => {
+          count++;
+          return request(call);
+        };
+        Worker.prototype.postMessage = function (this: Worker, ...given: unknown[]): void {
+          count++;
+          post.apply(this, given as Parameters<typeof post>);
+        };
+        setTimeout(() => {
+          const resting = count;
+          const { map } = globalThis as Global;
+          map
+            .once("idle", () => {
+              done({ resting, moving: count });
+            })
+            .setLight({ azimuth_deg: 10 });
+        }, 1000);
+      }),
+  );
   expect(counts.resting).toBe(0);
   expect(counts.moving).toBeGreaterThan(4);
 });
 
 test("the old picture stays while new light is computed", async () => {
   const { page } = await bed.start("town", { drawer: "canvas" });
-  const least = await page.evaluate(() => new Promise<number>((done) => {
-    const { map } = globalThis as Global;
-    const copy = new OffscreenCanvas(80, 60).getContext("2d", { willReadFrequently: true }) as OffscreenCanvasRenderingContext2D;
-    let least = Infinity;
-    const look = (): void => {
-      copy.clearRect(0, 0, 80, 60);
-      copy.drawImage(map.canvas, 0, 0, 80, 60);
-      least = Math.min(least, copy.getImageData(0, 0, 80, 60).data.filter((value, k) => k % 4 === 3 && value > 0).length);
-      requestAnimationFrame(look);
-    };
-    look();
-    const full = least;
-    map.once("idle", () => { done(least / full); });
-    for (let k = 1; k < 12; k++) setTimeout(() => map.setLight({ azimuth_deg: 30 * k }), 30 * k);
-  }));
+  const least = await page.evaluate(
+    () =>
+      new Promise<number>((done) => {
+        const { map } = globalThis as Global;
+        const copy = new OffscreenCanvas(80, 60).getContext("2d", { willReadFrequently: true }) as OffscreenCanvasRenderingContext2D;
+        let least = Infinity;
+        const look = (): void => {
+          copy.clearRect(0, 0, 80, 60);
+          copy.drawImage(map.canvas, 0, 0, 80, 60);
+          least = Math.min(least, copy.getImageData(0, 0, 80, 60).data.filter((value, k) => k % 4 === 3 && value > 0).length);
+          requestAnimationFrame(look);
+        };
+        look();
+        const full = least;
+        map.once("idle", () => {
+          done(least / full);
+        });
+        for (let k = 1; k < 12; k++) setTimeout(() => map.setLight({ azimuth_deg: 30 * k }), 30 * k);
+      }),
+  );
   expect(least).toBe(1);
 });
 
@@ -277,7 +348,8 @@ test("if pixels cannot be read exactly, compositing lights nearly the same", asy
   const { page: plain } = await bed.start("town", { ...options, drawer: "webgl" });
   const { page } = await bed.openPage();
   await page.addInitScript(() => {
-    const spoil = "{ const read = OffscreenCanvasRenderingContext2D.prototype.getImageData; OffscreenCanvasRenderingContext2D.prototype.getImageData = function (...at) { const image = read.apply(this, at); for (let k = 0; k < image.data.length; k++) image.data[k] ^= 7 * (k & 1); return image; }; }";
+    const spoil =
+      "{ const read = OffscreenCanvasRenderingContext2D.prototype.getImageData; OffscreenCanvasRenderingContext2D.prototype.getImageData = function (...at) { const image = read.apply(this, at); for (let k = 0; k < image.data.length; k++) image.data[k] ^= 7 * (k & 1); return image; }; }";
     const Plain = Blob;
     globalThis.Blob = class extends Plain {
       constructor(parts: BlobPart[] = [], options?: BlobPropertyBag) {
@@ -286,12 +358,18 @@ test("if pixels cannot be read exactly, compositing lights nearly the same", asy
     };
   });
   await page.goto(`${bed.server.origin}/bare`);
-  await page.evaluate(([base, options]) => new Promise<void>((done) => {
-    const g = globalThis as Global;
-    g.map = new g.map3d.map("mapcanvas", { ...options, drawer: "canvas", preserveDrawingBuffer: true });
-    g.layer = new g.map3d.imageLayer(base).addTo(g.map);
-    g.map.once("idle", () => { done(); });
-  }), [bed.url("town"), options] as const);
+  await page.evaluate(
+    ([base, options]) =>
+      new Promise<void>((done) => {
+        const g = globalThis as Global;
+        g.map = new g.map3d.map("mapcanvas", { ...options, drawer: "canvas", preserveDrawingBuffer: true });
+        g.layer = new g.map3d.imageLayer(base).addTo(g.map);
+        g.map.once("idle", () => {
+          done();
+        });
+      }),
+    [bed.url("town"), options] as const,
+  );
   const lit = differenceOf(await picture(plain), await picture(page));
   await page.screenshot({ path: `${OUT}/canvas-composed.png` });
   expect(lit.most).toBeLessThan(4); // altered bytes, once read, would differ by more

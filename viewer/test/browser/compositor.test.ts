@@ -16,7 +16,9 @@ function count(): void {
   const g = globalThis as Counting;
   g.counts = { puts: 0, draws: 0 };
   const own = CanvasRenderingContext2D.prototype;
-  const [put, draw] = (["putImageData", "drawImage"] as const).map((name) => Object.getOwnPropertyDescriptor(own, name)?.value as (this: CanvasRenderingContext2D, ...given: unknown[]) => void);
+  const [put, draw] = (["putImageData", "drawImage"] as const).map(
+    (name) => Object.getOwnPropertyDescriptor(own, name)?.value as (this: CanvasRenderingContext2D, ...given: unknown[]) => void,
+  );
   own.putImageData = function (this: CanvasRenderingContext2D, ...given: unknown[]) {
     g.counts.puts++;
     put?.apply(this, given);
@@ -28,12 +30,13 @@ function count(): void {
 }
 
 /** Returns the draw calls since the last call. */
-const counted = (page: Page): Promise<Counting["counts"]> => page.evaluate(() => {
-  const g = globalThis as Counting;
-  const { counts } = g;
-  g.counts = { puts: 0, draws: 0 };
-  return counts;
-});
+const counted = (page: Page): Promise<Counting["counts"]> =>
+  page.evaluate(() => {
+    const g = globalThis as Counting;
+    const { counts } = g;
+    g.counts = { puts: 0, draws: 0 };
+    return counts;
+  });
 
 test("unchanged tiles are moved and scaled, not drawn; new light draws each tile once", async () => {
   const { page, problems } = await bed.start("town", { ...QUIET, preserveDrawingBuffer: false });
@@ -54,10 +57,26 @@ test("unchanged tiles are moved and scaled, not drawn; new light draws each tile
 test("several layers, translucent and clipped, look the same as on a canvas", async () => {
   const shots: Buffer[] = [];
   for (const preserveDrawingBuffer of [true, false]) {
-    const { page, problems } = await bed.start("town", { ...QUIET, preserveDrawingBuffer }, {}, { viewport: { width: 500, height: 400 }, deviceScaleFactor: 2, bypassCSP: true });
+    const { page, problems } = await bed.start(
+      "town",
+      { ...QUIET, preserveDrawingBuffer },
+      {},
+      { viewport: { width: 500, height: 400 }, deviceScaleFactor: 2, bypassCSP: true },
+    );
     // Page styles that apply to every canvas and block.
-    if (!preserveDrawingBuffer) await page.addStyleTag({ content: "canvas:not(#mapcanvas) { width: 100%; height: 100%; max-width: 90%; margin: 7px; border: 2px solid red; padding: 3px; opacity: 0.5; transition: transform 1s } .map3d-mosaics, .map3d-mosaics div { margin: 9px; padding: 4px; border: 1px solid; transform: scale(0.9) }" });
-    await settled(page, (url) => new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.6, combine: false }).addTo((globalThis as Global).map).setClip([0, 0, 0.613, 0.8]), bed.url("later"));
+    if (!preserveDrawingBuffer)
+      await page.addStyleTag({
+        content:
+          "canvas:not(#mapcanvas) { width: 100%; height: 100%; max-width: 90%; margin: 7px; border: 2px solid red; padding: 3px; opacity: 0.5; transition: transform 1s } .map3d-mosaics, .map3d-mosaics div { margin: 9px; padding: 4px; border: 1px solid; transform: scale(0.9) }",
+      });
+    await settled(
+      page,
+      (url) =>
+        new (globalThis as Global).map3d.imageLayer(url, { mode: "id", opacity: 0.6, combine: false })
+          .addTo((globalThis as Global).map)
+          .setClip([0, 0, 0.613, 0.8]),
+      bed.url("later"),
+    );
     await settled(page, () => (globalThis as Global).map.setZoom(3.37), null);
     shots.push(await page.screenshot({ path: `${OUT}/laid-${String(preserveDrawingBuffer)}.png` }));
     expect(problems).toEqual([]);
@@ -78,16 +97,23 @@ test("several layers, translucent and clipped, look the same as on a canvas", as
 test("a change of view cross-fades: a copy of the old picture covers the new one", async () => {
   const { page, problems } = await bed.start("town", { ...QUIET, preserveDrawingBuffer: false });
   await page.addScriptTag({ url: `${bed.server.origin}/map3d-orbit.js` });
-  const seen = await page.evaluate(() => new Promise<readonly (number | boolean)[]>((done) => {
-    const g = globalThis as Global & { map3d: { orbit: new () => { addTo(map: unknown): unknown } } };
-    new g.map3d.orbit().addTo(g.map);
-    g.map.once("directionchange", () => requestAnimationFrame(() => {
-      const [first, second] = document.querySelectorAll<HTMLElement>(".map3d-mosaics");
-      const copy = second?.querySelector("canvas");
-      const pixel = copy?.getContext("2d")?.getImageData(copy.width / 2, copy.height / 2, 1, 1).data[3];
-      done([document.querySelectorAll(".map3d-mosaics").length, first?.nextElementSibling === second, pixel === 255]);
-    })).rotate(1);
-  }));
+  const seen = await page.evaluate(
+    () =>
+      new Promise<readonly (number | boolean)[]>((done) => {
+        const g = globalThis as Global & { map3d: { orbit: new () => { addTo(map: unknown): unknown } } };
+        new g.map3d.orbit().addTo(g.map);
+        g.map
+          .once("directionchange", () =>
+            requestAnimationFrame(() => {
+              const [first, second] = document.querySelectorAll<HTMLElement>(".map3d-mosaics");
+              const copy = second?.querySelector("canvas");
+              const pixel = copy?.getContext("2d")?.getImageData(copy.width / 2, copy.height / 2, 1, 1).data[3];
+              done([document.querySelectorAll(".map3d-mosaics").length, first?.nextElementSibling === second, pixel === 255]);
+            }),
+          )
+          .rotate(1);
+      }),
+  );
   expect(seen).toEqual([2, true, true]);
   await page.waitForFunction(() => document.querySelectorAll(".map3d-mosaics").length === 1);
   expect(problems).toEqual([]);

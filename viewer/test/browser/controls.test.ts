@@ -15,18 +15,32 @@ const bed = new TestBed({ town, placeless }, { draws: false });
 type Controlled = Global & { map3d: typeof Controls; control: Controls.locate; overview: Controls.overview };
 
 const START = { zoom: 3, center: [ORIGIN[0], ORIGIN[1], ORIGIN[2]] };
-const said = (page: Page, text: string): Promise<unknown> => page.waitForFunction((wanted) => document.querySelector(".map3d-status")?.textContent === wanted, text);
+const said = (page: Page, text: string): Promise<unknown> =>
+  page.waitForFunction((wanted) => document.querySelector(".map3d-status")?.textContent === wanted, text);
 
 test("the location is shown on the surface with an accuracy circle; denied, outside and missing georeference show messages", async () => {
-  const { page, problems } = await bed.start("town", { ...START, zoom: 1, language: "de" }, {}, { permissions: ["geolocation"], reducedMotion: "reduce" });
+  const { page, problems } = await bed.start(
+    "town",
+    { ...START, zoom: 1, language: "de" },
+    {},
+    { permissions: ["geolocation"], reducedMotion: "reduce" },
+  );
   await page.addScriptTag({ url: "/map3d-controls.js" });
   await page.evaluate(() => {
     const g = globalThis as unknown as Controlled;
     g.control = new g.map3d.locate().addTo(g.map);
   });
   const button = page.getByRole("button", { name: "Meinen Standort anzeigen" });
-  for (const [x, y, z] of [[-80, -60, 0], [-45, 0, 34], [32, 26, 62]] as const) {
-    const [longitude, latitude] = await page.evaluate((world) => (globalThis as Global).map.lonLat(world) as [number, number], [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2]] as const);
+  for (const [x, y, z] of [
+    [-80, -60, 0],
+    [-45, 0, 34],
+    [32, 26, 62],
+  ] as const) {
+    const [longitude, latitude] = await page.evaluate((world) => (globalThis as Global).map.lonLat(world) as [number, number], [
+      ORIGIN[0] + x,
+      ORIGIN[1] + y,
+      ORIGIN[2],
+    ] as const);
     await page.context().setGeolocation({ longitude, latitude, accuracy: 12 });
     await button.click();
     await page.waitForSelector(".map3d-accuracy");
@@ -34,7 +48,12 @@ test("the location is shown on the surface with an accuracy circle; denied, outs
     await drawn(page);
     const [center, zoom, circle, wide] = await page.evaluate(() => {
       const { map } = globalThis as Global;
-      return [map.unproject([400, 300]), map.zoom, document.querySelector(".map3d-accuracy path")?.getBoundingClientRect().width, 24 / map.metresPerPixel] as const;
+      return [
+        map.unproject([400, 300]),
+        map.zoom,
+        document.querySelector(".map3d-accuracy path")?.getBoundingClientRect().width,
+        24 / map.metresPerPixel,
+      ] as const;
     });
     // Along the line of sight from the place on the surface to the ground: as much further north as it is lower, at 45 degrees.
     const low = ORIGIN[2] - 2;
@@ -46,7 +65,11 @@ test("the location is shown on the surface with an accuracy circle; denied, outs
     await button.click();
     expect(await page.locator(".map3d-accuracy, .map3d-marker").count()).toBe(0);
   }
-  for (const [longitude, latitude] of [[13.4, 52.5], [11.6, 48.15], [-120, -30]] as const) {
+  for (const [longitude, latitude] of [
+    [13.4, 52.5],
+    [11.6, 48.15],
+    [-120, -30],
+  ] as const) {
     await page.context().setGeolocation({ longitude, latitude, accuracy: 30 });
     await button.click();
     await said(page, "Ihr Standort liegt außerhalb dieser Karte.");
@@ -56,7 +79,7 @@ test("the location is shown on the surface with an accuracy circle; denied, outs
   await said(page, "Der Zugriff auf Ihren Standort ist blockiert. Erlauben Sie ihn in den Browsereinstellungen für diese Seite.");
   await page.screenshot({ path: `${OUT}/locate-denied.png` });
   await page.evaluate(() => (globalThis as unknown as Controlled).control.remove());
-  expect(await button.count() + await page.locator(".map3d-status").count()).toBe(0);
+  expect((await button.count()) + (await page.locator(".map3d-status").count())).toBe(0);
   expect(problems).toEqual([]);
   await page.context().close();
   const { page: other } = await bed.start("placeless", START);
@@ -69,28 +92,43 @@ test("the location is shown on the surface with an accuracy circle; denied, outs
 });
 
 /** The frame's middle and size in the small map, and the ground in the large map's middle. */
-const stateOf = (page: Page): Promise<{ x: number; y: number; width: number; height: number; at: readonly number[] }> => page.evaluate(() => {
-  const [box, frame] = [".map3d-overview-map", ".map3d-overview-frame"].map((name) => document.querySelector(name)?.getBoundingClientRect() as DOMRect) as [DOMRect, DOMRect];
-  const { map } = globalThis as Global;
-  const { clientWidth, clientHeight } = map.container;
-  return { x: frame.x + frame.width / 2 - box.x, y: frame.y + frame.height / 2 - box.y, width: frame.width, height: frame.height, at: map.unproject([clientWidth / 2, clientHeight / 2]) ?? [] };
-});
+const stateOf = (page: Page): Promise<{ x: number; y: number; width: number; height: number; at: readonly number[] }> =>
+  page.evaluate(() => {
+    const [box, frame] = [".map3d-overview-map", ".map3d-overview-frame"].map(
+      (name) => document.querySelector(name)?.getBoundingClientRect() as DOMRect,
+    ) as [DOMRect, DOMRect];
+    const { map } = globalThis as Global;
+    const { clientWidth, clientHeight } = map.container;
+    return {
+      x: frame.x + frame.width / 2 - box.x,
+      y: frame.y + frame.height / 2 - box.y,
+      width: frame.width,
+      height: frame.height,
+      at: map.unproject([clientWidth / 2, clientHeight / 2]) ?? [],
+    };
+  });
 
 test("the overview's frame follows the view, by drag, click and keys; the overview rotates with the map; on phones it starts closed", async () => {
   const { page, problems } = await bed.start("town", { ...START, zoom: 4.5 }, {}, { reducedMotion: "reduce" });
   await page.addScriptTag({ url: "/map3d-controls.js" });
-  await page.evaluate(() => new Promise<void>((done) => {
-    const g = globalThis as unknown as Controlled;
-    g.overview = new g.map3d.overview().addTo(g.map);
-    const wait = (): void => { if (document.querySelector(".map3d-overview-frame")?.getAttribute("style")) done(); else setTimeout(wait, 50); };
-    wait();
-  }));
+  await page.evaluate(
+    () =>
+      new Promise<void>((done) => {
+        const g = globalThis as unknown as Controlled;
+        g.overview = new g.map3d.overview().addTo(g.map);
+        const wait = (): void => {
+          if (document.querySelector(".map3d-overview-frame")?.getAttribute("style")) done();
+          else setTimeout(wait, 50);
+        };
+        wait();
+      }),
+  );
   await drawn(page);
   const first = await steady(page, () => stateOf(page));
   await page.screenshot({ path: `${OUT}/overview.png` });
   expect(first.width / first.height).toBeCloseTo(800 / 600, 1);
-  const pad = await page.locator(".map3d-overview-pad").boundingBox() as { x: number; y: number };
-  const small_m = (await page.evaluate(() => (globalThis as Global).map.metresPerPixel)) * 800 / first.width;
+  const pad = (await page.locator(".map3d-overview-pad").boundingBox()) as { x: number; y: number };
+  const small_m = ((await page.evaluate(() => (globalThis as Global).map.metresPerPixel)) * 800) / first.width;
   await page.mouse.move(pad.x + first.x, pad.y + first.y);
   await page.mouse.down();
   await page.mouse.move(pad.x + first.x + 6, pad.y + first.y, { steps: 3 });
@@ -102,7 +140,15 @@ test("the overview's frame follows the view, by drag, click and keys; the overvi
   expect(dragged.y - first.y).toBeCloseTo(-8, 0);
   expect((dragged.at[0] ?? 0) - (first.at[0] ?? 0)).toBeCloseTo(12 * small_m, -0.5);
   await page.mouse.click(pad.x + 60, pad.y + 90);
-  await expect.poll(async () => { const { x, y } = await stateOf(page); return [Math.round(x / 3), Math.round(y / 3)]; }, { timeout: 15_000 }).toEqual([20, 30]);
+  await expect
+    .poll(
+      async () => {
+        const { x, y } = await stateOf(page);
+        return [Math.round(x / 3), Math.round(y / 3)];
+      },
+      { timeout: 15_000 },
+    )
+    .toEqual([20, 30]);
   const clicked = await stateOf(page);
   await page.locator(".map3d-overview-pad").focus();
   await page.keyboard.press("ArrowRight");

@@ -9,8 +9,25 @@ import { picture, settled, type Global } from "./page";
 
 /** A planned house with its own origin and resolution: in front of some objects, behind others, on the town's ground. */
 const SHIFT = [13.7, -8.3, 1.5] as const;
-const HOUSE: Thing = { id: 77, name: "Planned house", box: [[-130, -20, -3], [6, 30, 26]], wall: [240, 120, 30], roof: [250, 60, 60] };
-const PLAN: Place = { name: "plan", origin: [ORIGIN[0] + SHIFT[0], ORIGIN[1] + SHIFT[1], ORIGIN[2] + SHIFT[2]], box: [[-130, -30, -3], [20, 40, 30]], things: [HOUSE] };
+const HOUSE: Thing = {
+  id: 77,
+  name: "Planned house",
+  box: [
+    [-130, -20, -3],
+    [6, 30, 26],
+  ],
+  wall: [240, 120, 30],
+  roof: [250, 60, 60],
+};
+const PLAN: Place = {
+  name: "plan",
+  origin: [ORIGIN[0] + SHIFT[0], ORIGIN[1] + SHIFT[1], ORIGIN[2] + SHIFT[2]],
+  box: [
+    [-130, -30, -3],
+    [20, 40, 30],
+  ],
+  things: [HOUSE],
+};
 
 const town = renderTown();
 const plan = renderTown(128, 0.29, PLAN);
@@ -20,7 +37,8 @@ const undrawn = new TestBed(bed.server, { draws: false });
 const VIEWPORT = { viewport: { width: 500, height: 420 } };
 const OPTIONS = { center: [ORIGIN[0] - 45, ORIGIN[1], ORIGIN[2]], zoom: 3, direction: "0-45", light: { lit: false } };
 
-const frameIn = ({ json }: Fixture, id = "0-45"): Frame => makeFrame(json.views.find((view) => view.id === id) as (typeof json.views)[0], json.size_m, json.tile_px, json.zmax);
+const frameIn = ({ json }: Fixture, id = "0-45"): Frame =>
+  makeFrame(json.views.find((view) => view.id === id) as (typeof json.views)[0], json.size_m, json.tile_px, json.zmax);
 const [townFrame, planFrame] = [frameIn(town), frameIn(plan)];
 const [du, dv, dd] = uvdFromLocal(townFrame.axes, SHIFT);
 
@@ -37,7 +55,11 @@ const addPlan = ([url, options]: readonly [string, object]): unknown => {
 
 /** The visible colours where the rays of a pixel and of its neighbours hit the same objects in the same order. */
 async function judged(page: Parameters<typeof picture>[0], opacity: number): Promise<{ wrong: string[]; counts: Record<string, number> }> {
-  const [shot, corner, px] = [await picture(page), await page.evaluate(() => (globalThis as Global).map.project([691000, 5336000, 500])), await page.evaluate(() => (globalThis as Global).map.metresPerPixel)];
+  const [shot, corner, px] = [
+    await picture(page),
+    await page.evaluate(() => (globalThis as Global).map.project([691000, 5336000, 500])),
+    await page.evaluate(() => (globalThis as Global).map.metresPerPixel),
+  ];
   const [x0, y0] = corner as [number, number];
   const [wrong, counts]: [string[], Record<string, number>] = [[], { townBefore: 0, houseBefore: 0, houseAlone: 0, townAlone: 0 }];
   for (let y = 2; y < 418; y += 3) {
@@ -45,7 +67,8 @@ async function judged(page: Parameters<typeof picture>[0], opacity: number): Pro
       const at = (dx: number, dy: number): ReturnType<typeof hits> => hits((x + dx + 0.5 - x0) * px, (y0 - y - dy - 0.5) * px);
       const all = [at(0, 0), at(-3, 0), at(3, 0), at(0, -3), at(0, 3)];
       const [here] = all as [ReturnType<typeof hits>];
-      const kind = ({ town: a, house: b, far }: ReturnType<typeof hits>): string => `${String(a?.id)} ${String(a?.normal)} ${String(b?.id)} ${String(b?.normal)} ${String(far[0] < far[1])}`;
+      const kind = ({ town: a, house: b, far }: ReturnType<typeof hits>): string =>
+        `${String(a?.id)} ${String(a?.normal)} ${String(b?.id)} ${String(b?.normal)} ${String(far[0] < far[1])}`;
       if (new Set(all.map(kind)).size > 1 || Math.abs(here.far[0] - here.far[1]) < 2) continue;
       const [first, second] = [here.town, here.house];
       const front = here.far[1] < here.far[0];
@@ -56,7 +79,8 @@ async function judged(page: Parameters<typeof picture>[0], opacity: number): Pro
       // The house has flat colours except for windows and stripes, and so have the town's objects.
       const over = opacity === 1 ? plain(second) : plain(second).map((byte, k) => byte * opacity + (plain(first)[k] ?? 0) * (1 - opacity));
       const want = front ? (first || opacity === 1 ? over : [...plain(second).slice(0, 3), 255 * opacity]) : plain(first);
-      if (want.some((byte, k) => Math.abs(byte - (got[k] ?? 0)) > 12) && !nearWindow(all)) wrong.push(`${String(x)}, ${String(y)}: ${got.join(" ")} for ${want.map(Math.round).join(" ")}`);
+      if (want.some((byte, k) => Math.abs(byte - (got[k] ?? 0)) > 12) && !nearWindow(all))
+        wrong.push(`${String(x)}, ${String(y)}: ${got.join(" ")} for ${want.map(Math.round).join(" ")}`);
     }
   }
   return { wrong, counts };
@@ -64,33 +88,43 @@ async function judged(page: Parameters<typeof picture>[0], opacity: number): Pro
 
 /** Colours change from pixel to pixel there. */
 const nearWindow = (all: readonly ReturnType<typeof hits>[]): boolean =>
-  new Set(all.map(({ house }) => String(house?.color.map((byte) => byte >> 4)))).size > 1 || new Set(all.map(({ town: hit }) => String(hit?.color.map((byte) => byte >> 4)))).size > 1;
+  new Set(all.map(({ house }) => String(house?.color.map((byte) => byte >> 4)))).size > 1 ||
+  new Set(all.map(({ town: hit }) => String(hit?.color.map((byte) => byte >> 4)))).size > 1;
 
-test.each(["webgl", "canvas"])("%s: of two renderings with different origins and resolutions, the nearer surface is visible", async (drawer) => {
-  const { page, problems } = await bed.start("town", { ...OPTIONS, drawer }, {}, VIEWPORT);
-  await page.evaluate(addPlan, [bed.url("plan"), {}] as const);
-  await page.waitForFunction(() => (globalThis as unknown as { plan: Global["layer"] }).plan.rendering);
-  await settled(page, () => (globalThis as Global).map.panBy(0, 0), null);
-  await page.screenshot({ path: `${OUT}/together-${drawer}.png` });
-  const { wrong, counts } = await judged(page, 1);
-  expect(wrong.slice(0, 5)).toEqual([]);
-  expect(Object.entries(counts).filter(([, count]) => count < 40)).toEqual([]);
+test.each(["webgl", "canvas"])(
+  "%s: of two renderings with different origins and resolutions, the nearer surface is visible",
+  async (drawer) => {
+    const { page, problems } = await bed.start("town", { ...OPTIONS, drawer }, {}, VIEWPORT);
+    await page.evaluate(addPlan, [bed.url("plan"), {}] as const);
+    await page.waitForFunction(() => (globalThis as unknown as { plan: Global["layer"] }).plan.rendering);
+    await settled(page, () => (globalThis as Global).map.panBy(0, 0), null);
+    await page.screenshot({ path: `${OUT}/together-${drawer}.png` });
+    const { wrong, counts } = await judged(page, 1);
+    expect(wrong.slice(0, 5)).toEqual([]);
+    expect(Object.entries(counts).filter(([, count]) => count < 40)).toEqual([]);
 
-  await settled(page, () => (globalThis as unknown as { plan: Global["layer"] }).plan.setOpacity(0.5), null);
-  await page.screenshot({ path: `${OUT}/together-half-${drawer}.png` });
-  expect((await judged(page, 0.5)).wrong.slice(0, 5)).toEqual([]);
-  expect(problems).toEqual([]);
-});
+    await settled(page, () => (globalThis as unknown as { plan: Global["layer"] }).plan.setOpacity(0.5), null);
+    await page.screenshot({ path: `${OUT}/together-half-${drawer}.png` });
+    expect((await judged(page, 0.5)).wrong.slice(0, 5)).toEqual([]);
+    expect(problems).toEqual([]);
+  },
+);
 
 test("picks match the visible surface; a clip shows a layer in a part of the map only", async () => {
   const { page, problems } = await undrawn.start("town", OPTIONS, {}, VIEWPORT);
   await settled(page, addPlan, [bed.url("plan"), {}] as const);
-  const pickAt = (world: readonly number[]): Promise<unknown[]> => page.evaluate(async (at) => {
-    const { map, layer } = globalThis as Global;
-    const point = map.project(at as unknown as readonly [number, number, number]) as [number, number];
-    const [exact, loaded] = [await map.pick(point), map.pickLoaded(point)];
-    return [exact.id, exact.layer === layer ? "town" : exact.layer ? "plan" : null, exact.position?.map((part, k) => Math.abs(part - (at[k] ?? 0)) < 0.6), loaded?.layer === exact.layer];
-  }, world);
+  const pickAt = (world: readonly number[]): Promise<unknown[]> =>
+    page.evaluate(async (at) => {
+      const { map, layer } = globalThis as Global;
+      const point = map.project(at as unknown as readonly [number, number, number]) as [number, number];
+      const [exact, loaded] = [await map.pick(point), map.pickLoaded(point)];
+      return [
+        exact.id,
+        exact.layer === layer ? "town" : exact.layer ? "plan" : null,
+        exact.position?.map((part, k) => Math.abs(part - (at[k] ?? 0)) < 0.6),
+        loaded?.layer === exact.layer,
+      ];
+    }, world);
   const inTown = (x: number, y: number, z: number): number[] => [ORIGIN[0] + x, ORIGIN[1] + y, ORIGIN[2] + z];
   const near = [true, true, true];
   // The planned house's roof; the town hall's roof, which hides part of it; the chapel's roof, part of which it hides.
@@ -109,7 +143,9 @@ test("a rendering in another CRS is refused with a reason, and the first one sta
   const before = await picture(page);
   await page.evaluate(addPlan, [bed.url("abroad"), {}] as const);
   await page.waitForFunction(() => (globalThis as Global).errors.length > 0);
-  expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([`rendering "abroad" cannot be shown on this map: its CRS is "EPSG:2056 CH1903+ / LV95", but the map's is "EPSG:25832 ETRS89 / UTM zone 32N"`]);
+  expect(await page.evaluate(() => (globalThis as Global).errors)).toEqual([
+    `rendering "abroad" cannot be shown on this map: its CRS is "EPSG:2056 CH1903+ / LV95", but the map's is "EPSG:25832 ETRS89 / UTM zone 32N"`,
+  ]);
   await settled(page, () => (globalThis as Global).map.setLight({ lit: false }), null);
   expect(before.equals(await picture(page))).toBe(true);
 });

@@ -12,7 +12,24 @@ import { OUT } from "./browser";
 const bed = new TestBed({ town: renderTown(), later: renderLater() });
 const FOLDER = join(VIEWER, "examples");
 const FILES = readdirSync(FOLDER).filter((file) => file.endsWith(".html"));
-const ORDER = ["shortest", "markers", "attributes", "theme", "labels", "measure", "sun", "search", "company", "directions", "times", "styles", "link", "model", "files", "portrayal"];
+const ORDER = [
+  "shortest",
+  "markers",
+  "attributes",
+  "theme",
+  "labels",
+  "measure",
+  "sun",
+  "search",
+  "company",
+  "directions",
+  "times",
+  "styles",
+  "link",
+  "model",
+  "files",
+  "portrayal",
+];
 const COLOURS = 24;
 
 /** Counts the colours in a part of the page: a map that shows something has many. */
@@ -133,17 +150,28 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     await page.getByRole("button", { name: "Side by side" }).click();
     await still(page);
     await page.screenshot({ path: `${OUT}/example-times-side-by-side.png` });
-    expect(await page.evaluate("[map, right].map((each) => [each.layers.length, each.layers[0].rendering.json.name, each.direction, each.zoom])")).toEqual([[1, "town", "0-45", 2.6], [1, "later", "0-45", 2.6]]);
+    expect(
+      await page.evaluate(
+        "[map, right].map((each) => [each.layers.length, each.layers[0].rendering.json.name, each.direction, each.zoom])",
+      ),
+    ).toEqual([
+      [1, "town", "0-45", 2.6],
+      [1, "later", "0-45", 2.6],
+    ]);
     expect(await page.evaluate("[before.clip, after.clip]")).toEqual([null, null]);
     await page.getByRole("button", { name: "One map" }).click();
     await still(page);
-    expect(await page.evaluate("[map.layers.length, before.clip, after.clip, map.zoom, right.container.isConnected && !box.hidden]")).toEqual([2, [0, 0, 0.5, 1], [0.5, 0, 1, 1], 2.6, false]);
+    expect(
+      await page.evaluate("[map.layers.length, before.clip, after.clip, map.zoom, right.container.isConnected && !box.hidden]"),
+    ).toEqual([2, [0, 0, 0.5, 1], [0.5, 0, 1, 1], 2.6, false]);
   },
   styles: async (page) => {
     for (const mode of ["normal", "depth"]) expect(await colours(page, `[data-mode=${mode}]`)).toBeGreaterThan(COLOURS / 4);
     await page.locator("[data-mode=depth]").getByRole("button", { name: "Zoom in" }).click();
     await still(page);
-    const views = await page.evaluate<[string, number, number[]][]>("maps.map((map) => [map.direction, map.zoom, map.project([691000, 5336000, 500]).map(Math.round)])");
+    const views = await page.evaluate<[string, number, number[]][]>(
+      "maps.map((map) => [map.direction, map.zoom, map.project([691000, 5336000, 500]).map(Math.round)])",
+    );
     expect(views[0]).toEqual(views[2]);
     expect(views[1]).toEqual(views[2]);
   },
@@ -196,7 +224,8 @@ test("the index lists all examples", () => {
   expect(FILES.sort()).toEqual([...ORDER.map((name) => `${name}.html`), "examples.html"].sort());
   const index = readFileSync(join(FOLDER, "examples.html"), "utf8");
   expect([...index.matchAll(/<li><a href="(\w+)\.html">/g)].map(([, name]) => name)).toEqual(ORDER);
-  for (const file of FILES) expect(readFileSync(join(FOLDER, file), "utf8")).not.toMatch(/\son\w+=|innerHTML|https?:\/\/(?!.*example\.org)/);
+  for (const file of FILES)
+    expect(readFileSync(join(FOLDER, file), "utf8")).not.toMatch(/\son\w+=|innerHTML|https?:\/\/(?!.*example\.org)/);
 });
 
 test.each(["examples", ...ORDER])("%s", async (name) => {
@@ -207,7 +236,13 @@ test.each(["examples", ...ORDER])("%s", async (name) => {
   await page.screenshot({ path: `${OUT}/example-${name}.png` });
   if (name !== "examples") expect(await colours(page, ".map3d")).toBeGreaterThan(COLOURS);
   await POINTS[name]?.(page, picture);
-  const nameless = await page.locator("button, input, select, a").evaluateAll((all) => all.filter((node) => !(node.textContent.trim() || node.ariaLabel || (node as HTMLInputElement).labels?.length)).map((node) => node.outerHTML));
+  const nameless = await page
+    .locator("button, input, select, a")
+    .evaluateAll((all) =>
+      all
+        .filter((node) => !(node.textContent.trim() || node.ariaLabel || (node as HTMLInputElement).labels?.length))
+        .map((node) => node.outerHTML),
+    );
   expect(nameless).toEqual([]);
   expect(problems).toEqual([]);
 });

@@ -7,14 +7,20 @@ import { serve, TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { pixels, settled, type Global } from "./page";
 
-interface Addable { addTo(map: Global["map"]): unknown }
+interface Addable {
+  addTo(map: Global["map"]): unknown;
+}
 const town = renderTown(64, 0.76);
 
 const drawn = new TestBed({ town, ramp: renderRamp(), published: published(town) });
 const bed = new TestBed(drawn.server, { draws: false });
 const other = serve({ town });
 
-test.each([[4, 2.4], [3.37, 3.4], [2.5, 6.2]])("at zoom %d no seam is visible between tiles", async (zoom, most) => {
+test.each([
+  [4, 2.4],
+  [3.37, 3.4],
+  [2.5, 6.2],
+])("at zoom %d no seam is visible between tiles", async (zoom, most) => {
   const { page } = await drawn.start("ramp", { zoom, light: { lit: false } });
   const got = await pixels(page);
   let steepest = 0;
@@ -52,14 +58,23 @@ test("a published folder is read from its archives by byte ranges", async () => 
 
 test("keys pan, zoom and rotate while the map has the focus", async () => {
   const { page } = await bed.start("town", { zoom: 3.8 });
-  const state = (): Promise<{ zoom: number; direction: string; x: number }> => page.evaluate((world) => {
-    const { map } = globalThis as Global;
-    return { zoom: map.zoom, direction: map.direction, x: map.project(world)?.[0] ?? NaN };
-  }, ORIGIN as [number, number, number]);
+  const state = (): Promise<{ zoom: number; direction: string; x: number }> =>
+    page.evaluate(
+      (world) => {
+        const { map } = globalThis as Global;
+        return { zoom: map.zoom, direction: map.direction, x: map.project(world)?.[0] ?? NaN };
+      },
+      ORIGIN as [number, number, number],
+    );
   const first = await state();
-  await page.evaluate(() => { (globalThis as Global).map.container.focus(); });
+  await page.evaluate(() => {
+    (globalThis as Global).map.container.focus();
+  });
   await page.keyboard.press("ArrowRight");
-  await page.waitForFunction(([world, x]) => Math.abs(((globalThis as Global).map.project(world)?.[0] ?? 0) - x) < 1, [ORIGIN as [number, number, number], first.x - 90] as const);
+  await page.waitForFunction(([world, x]) => Math.abs(((globalThis as Global).map.project(world)?.[0] ?? 0) - x) < 1, [
+    ORIGIN as [number, number, number],
+    first.x - 90,
+  ] as const);
   await page.keyboard.press("+");
   await page.waitForFunction((zoom) => (globalThis as Global).map.zoom > zoom + 0.95, first.zoom);
   await page.keyboard.press("q");
@@ -85,22 +100,39 @@ test("two fingers zoom about the point between them", async () => {
   const session = await page.context().newCDPSession(page);
   const ground = await page.evaluate(() => (globalThis as Global).map.unproject([400, 300]) as [number, number, number]);
   const touch = (type: "touchStart" | "touchMove" | "touchEnd", apart: number): Promise<unknown> =>
-    session.send("Input.dispatchTouchEvent", { type, touchPoints: type === "touchEnd" ? [] : [{ x: 400 - apart, y: 300, id: 1 }, { x: 400 + apart, y: 300, id: 2 }] });
+    session.send("Input.dispatchTouchEvent", {
+      type,
+      touchPoints:
+        type === "touchEnd"
+          ? []
+          : [
+              { x: 400 - apart, y: 300, id: 1 },
+              { x: 400 + apart, y: 300, id: 2 },
+            ],
+    });
   await touch("touchStart", 50);
   for (let apart = 55; apart <= 100; apart += 5) await touch("touchMove", apart);
   await touch("touchEnd", 0);
-  const after = await page.evaluate((world) => ({ zoom: (globalThis as Global).map.zoom, at: (globalThis as Global).map.project(world) as [number, number] }), ground);
+  const after = await page.evaluate(
+    (world) => ({ zoom: (globalThis as Global).map.zoom, at: (globalThis as Global).map.project(world) as [number, number] }),
+    ground,
+  );
   expect(after.zoom).toBeCloseTo(4.8, 1);
   expect(Math.hypot(after.at[0] - 400, after.at[1] - 300)).toBeLessThan(3);
 });
 
 test("hovering reports the object under the pointer", async () => {
   const { page } = await bed.start("town", { hover: true, zoom: 2 });
-  const at = await page.evaluate(([x, y, z]) => {
-    const { map } = globalThis as Global;
-    map.on("mousemove", ({ id }) => { (globalThis as Global & { under: number }).under = id; });
-    return map.project([x - 45, y - 4, z + 34]) as [number, number];
-  }, ORIGIN as [number, number, number]);
+  const at = await page.evaluate(
+    ([x, y, z]) => {
+      const { map } = globalThis as Global;
+      map.on("mousemove", ({ id }) => {
+        (globalThis as Global & { under: number }).under = id;
+      });
+      return map.project([x - 45, y - 4, z + 34]) as [number, number];
+    },
+    ORIGIN as [number, number, number],
+  );
   await page.mouse.move(...at);
   await page.waitForFunction(() => (globalThis as Global & { under: number }).under === 17);
 });
@@ -108,10 +140,20 @@ test("hovering reports the object under the pointer", async () => {
 test("the debug overlay labels tiles with their names and their layers' bytes and ages", async () => {
   const { page } = await bed.start("town", { zoom: 4 });
   await page.addScriptTag({ url: `${bed.server.origin}/map3d-debug.js` });
-  await settled(page, () => { new (globalThis as Global & { map3d: { debugTiles: new () => Addable } }).map3d.debugTiles().addTo((globalThis as Global).map); }, null);
+  await settled(
+    page,
+    () => {
+      new (globalThis as Global & { map3d: { debugTiles: new () => Addable } }).map3d.debugTiles().addTo((globalThis as Global).map);
+    },
+    null,
+  );
   await page.screenshot({ path: `${OUT}/debug.png` });
-  expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(/^3\/\d\/\d × 2\.00\nnormal [1-9]*\d\.\d kB, \d s\ncolor [1-9]*\d\.\d kB, \d s$/);
-  expect(await page.locator(".map3d-debug > div").allTextContents()).not.toEqual(expect.arrayContaining([expect.stringMatching(/ 0\.0 kB/)]));
+  expect(await page.locator(".map3d-debug > div").first().textContent()).toMatch(
+    /^3\/\d\/\d × 2\.00\nnormal [1-9]*\d\.\d kB, \d s\ncolor [1-9]*\d\.\d kB, \d s$/,
+  );
+  expect(await page.locator(".map3d-debug > div").allTextContents()).not.toEqual(
+    expect.arrayContaining([expect.stringMatching(/ 0\.0 kB/)]),
+  );
 });
 
 test("a removed map restores the canvas, requests nothing, and can be replaced by another", async () => {
@@ -119,7 +161,8 @@ test("a removed map restores the canvas, requests nothing, and can be replaced b
   const left = await page.evaluate(async (base) => {
     const g = globalThis as Global;
     g.map.remove();
-    const bare = document.body.innerHTML.includes("map3d-controls") || document.querySelector("#mapcanvas")?.parentElement !== document.body;
+    const bare =
+      document.body.innerHTML.includes("map3d-controls") || document.querySelector("#mapcanvas")?.parentElement !== document.body;
     const next = new g.map3d.map("mapcanvas");
     new g.map3d.imageLayer(base).addTo(next);
     await new Promise((done) => next.once("load", done));
@@ -138,12 +181,18 @@ test("the canvas resizes with the window", async () => {
 test("a manifest of another version is refused with both version numbers", async () => {
   bed.server.renderings.set("new", { ...town, json: { ...town.json, version: 9 } });
   const { page } = await bed.bare();
-  const message = await page.evaluate((base) => new Promise<string>((done) => {
-    const { map3d } = globalThis as Global;
-    const map = new map3d.map("mapcanvas");
-    map.on("error", ({ error }) => { done(error.message); });
-    new map3d.imageLayer(base).addTo(map);
-  }), bed.url("new"));
+  const message = await page.evaluate(
+    (base) =>
+      new Promise<string>((done) => {
+        const { map3d } = globalThis as Global;
+        const map = new map3d.map("mapcanvas");
+        map.on("error", ({ error }) => {
+          done(error.message);
+        });
+        new map3d.imageLayer(base).addTo(map);
+      }),
+    bed.url("new"),
+  );
   expect(message).toMatch(/version 9.*version 1/);
 });
 
@@ -193,28 +242,46 @@ test("a pick is approximate if its deepest tile cannot be fetched", async () => 
     for (const path of files.keys()) if (/\/(id|depth)\/3\//.test(path)) files.set(path, new Uint8Array([0]));
   });
   const { page } = await bed.start(name, { hover: true });
-  const pick = await page.evaluate(async ([x, y, z]) => {
-    const { map, layer } = globalThis as Global;
-    const view = layer.rendering?.views.get("0-45");
-    for (const kind of ["id", "depth"]) {
-      const info = layer.rendering?.layers.get(kind);
-      if (view && info) await layer.tiles?.fetch(view, info, { z: 0, x: 0, y: 0 });
-    }
-    const { id, position, approximate } = await map.pick(map.project([x - 45, y - 4, z + 34]) as [number, number]);
-    return { id, position, approximate };
-  }, ORIGIN as [number, number, number]);
+  const pick = await page.evaluate(
+    async ([x, y, z]) => {
+      const { map, layer } = globalThis as Global;
+      const view = layer.rendering?.views.get("0-45");
+      for (const kind of ["id", "depth"]) {
+        const info = layer.rendering?.layers.get(kind);
+        if (view && info) await layer.tiles?.fetch(view, info, { z: 0, x: 0, y: 0 });
+      }
+      const { id, position, approximate } = await map.pick(map.project([x - 45, y - 4, z + 34]) as [number, number]);
+      return { id, position, approximate };
+    },
+    ORIGIN as [number, number, number],
+  );
   expect(pick).toMatchObject({ id: 17, approximate: true });
   const level0_m = (0.76 * 8) / 2;
-  expect(Math.hypot(...(pick.position ?? [0, 0, 0]).map((part, k) => part - ([ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34][k] ?? 0)))).toBeLessThan(4 * level0_m);
+  expect(
+    Math.hypot(...(pick.position ?? [0, 0, 0]).map((part, k) => part - ([ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34][k] ?? 0))),
+  ).toBeLessThan(4 * level0_m);
 });
 
 test("if colour has no alpha, the id layer tells covered pixels", async () => {
   const layers = town.json.layers.map((layer) => (layer.kind === "color" ? { ...layer, format: "jpeg" } : layer));
-  const name = changed("opaque", (files) => {
-    for (const [path, bytes] of town.raw) {
-      if (path.includes("/color/")) files.set(path, encodePng(64, 64, 4, bytes.map((value, at) => (at % 4 === 3 ? 255 : value))));
-    }
-  }, { layers });
+  const name = changed(
+    "opaque",
+    (files) => {
+      for (const [path, bytes] of town.raw) {
+        if (path.includes("/color/"))
+          files.set(
+            path,
+            encodePng(
+              64,
+              64,
+              4,
+              bytes.map((value, at) => (at % 4 === 3 ? 255 : value)),
+            ),
+          );
+      }
+    },
+    { layers },
+  );
   const { page } = await drawn.start(name, { zoom: 3.5 });
   const got = await pixels(page);
   const { page: plain } = await drawn.start("town", { zoom: 3.5 });
@@ -227,29 +294,45 @@ test("if colour has no alpha, the id layer tells covered pixels", async () => {
 
 test("markers can be focused and selected by keys, one at a time", async () => {
   const { page } = await bed.start("town", { controls: false });
-  await page.evaluate(([x, y, z]) => {
-    const { map, map3d } = globalThis as Global;
-    const told: string[] = [];
-    for (const name of ["a", "b"]) new map3d.marker(name, [x, y + told.length, z]).bindPopup(`about ${name}`).on("click", ({ marker }) => told.push(`click ${marker.label}`)).addTo(map);
-    map.on("select", ({ marker }) => told.push(`select ${marker.label}`));
-    Object.assign(globalThis, { told });
-    map.container.focus();
-  }, ORIGIN as [number, number, number]);
+  await page.evaluate(
+    ([x, y, z]) => {
+      const { map, map3d } = globalThis as Global;
+      const told: string[] = [];
+      for (const name of ["a", "b"])
+        new map3d.marker(name, [x, y + told.length, z])
+          .bindPopup(`about ${name}`)
+          .on("click", ({ marker }) => told.push(`click ${marker.label}`))
+          .addTo(map);
+      map.on("select", ({ marker }) => told.push(`select ${marker.label}`));
+      Object.assign(globalThis, { told });
+      map.container.focus();
+    },
+    ORIGIN as [number, number, number],
+  );
   await page.keyboard.press("Tab");
   await page.keyboard.press("Enter");
   await page.keyboard.press("Tab");
   await page.keyboard.press("Enter");
-  expect(await page.evaluate(() => (globalThis as unknown as { told: string[] }).told)).toEqual(["click a", "select a", "click b", "select b"]);
+  expect(await page.evaluate(() => (globalThis as unknown as { told: string[] }).told)).toEqual([
+    "click a",
+    "select a",
+    "click b",
+    "select b",
+  ]);
   expect(await page.locator(".map3d-marker-selected").count()).toBe(1);
   expect(await page.locator(".map3d-popup-body").allTextContents()).toEqual(["about a", "about b"]);
 });
 
 test("a drag that ends in motion continues with inertia and comes to rest", async () => {
   const { page } = await bed.start("town", { zoom: 4.5 });
-  const at = (): Promise<number> => page.evaluate((world) => (globalThis as Global).map.project(world)?.[0] ?? 0, ORIGIN as [number, number, number]);
+  const at = (): Promise<number> =>
+    page.evaluate((world) => (globalThis as Global).map.project(world)?.[0] ?? 0, ORIGIN as [number, number, number]);
   await page.evaluate(() => {
     const { map } = globalThis as Global;
-    const point = (type: string, x: number): void => void map.canvas.dispatchEvent(new PointerEvent(type, { pointerId: 1, pointerType: "touch", clientX: x, clientY: 300, bubbles: true }));
+    const point = (type: string, x: number): void =>
+      void map.canvas.dispatchEvent(
+        new PointerEvent(type, { pointerId: 1, pointerType: "touch", clientX: x, clientY: 300, bubbles: true }),
+      );
     map.canvas.setPointerCapture = () => undefined;
     return new Promise<void>((done) => {
       point("pointerdown", 300);
@@ -259,7 +342,9 @@ test("a drag that ends in motion continues with inertia and comes to rest", asyn
         if (x < 380) return;
         clearInterval(timer);
         point("pointerup", x);
-        map.once("moveend", () => { done(); });
+        map.once("moveend", () => {
+          done();
+        });
       }, 8);
     });
   });
@@ -286,13 +371,21 @@ test("objects in view are those with ids on the screen, sorted by area", async (
 
 test("calls before the manifest that fail are reported, and the others run", async () => {
   const { page } = await bed.bare();
-  const said = await page.evaluate((url) => new Promise<[string[], string]>((done) => {
-    const g = globalThis as Global;
-    const errors: string[] = [];
-    const view = new g.map3d.map("mapcanvas").setDirection("5-5").setDirection("90-45");
-    view.on("error", ({ error }) => errors.push(error.message)).once("idle", () => { done([errors, view.direction]); });
-    new g.map3d.imageLayer(url).addTo(view);
-  }), bed.url("town"));
+  const said = await page.evaluate(
+    (url) =>
+      new Promise<[string[], string]>((done) => {
+        const g = globalThis as Global;
+        const errors: string[] = [];
+        const view = new g.map3d.map("mapcanvas").setDirection("5-5").setDirection("90-45");
+        view
+          .on("error", ({ error }) => errors.push(error.message))
+          .once("idle", () => {
+            done([errors, view.direction]);
+          });
+        new g.map3d.imageLayer(url).addTo(view);
+      }),
+    bed.url("town"),
+  );
   expect(said[0]).toHaveLength(1);
   expect(said[0][0]).toMatch(/^unknown view "5-5"; the rendering has 0-45, /);
   expect(said[1]).toBe("90-45");

@@ -13,7 +13,26 @@ import { OUT } from "./browser";
 import { settled, type Global } from "./page";
 
 const GOLDEN = resolve(import.meta.dirname, "../golden");
-const PLAN: Place = { name: "plan", origin: [ORIGIN[0] + 13.7, ORIGIN[1] - 8.3, ORIGIN[2] + 1.5], box: [[-130, -30, -3], [20, 40, 30]], things: [{ id: 77, name: "Planned house", box: [[-130, -20, -3], [6, 30, 26]], wall: [240, 120, 30], roof: [250, 60, 60] }] };
+const PLAN: Place = {
+  name: "plan",
+  origin: [ORIGIN[0] + 13.7, ORIGIN[1] - 8.3, ORIGIN[2] + 1.5],
+  box: [
+    [-130, -30, -3],
+    [20, 40, 30],
+  ],
+  things: [
+    {
+      id: 77,
+      name: "Planned house",
+      box: [
+        [-130, -20, -3],
+        [6, 30, 26],
+      ],
+      wall: [240, 120, 30],
+      roof: [250, 60, 60],
+    },
+  ],
+};
 const bed = new TestBed({ town: renderTown(), plan: renderTown(128, 0.29, PLAN) }, { way: "exact" });
 
 const NOW = new Date("2026-06-21T11:00:00Z");
@@ -50,7 +69,10 @@ const scenes: Record<string, Scene> = {
   color: { layer: { mode: "color" }, map: { direction: "180-45" } },
   ids: { layer: { mode: "id" } },
   highlight: { act: (page) => settled(page, (ids) => (globalThis as Global).layer.highlight(ids), [HALL, CHAPEL]) },
-  "two-layers": { act: (page) => settled(page, (url) => new (globalThis as Global).map3d.imageLayer(url).addTo((globalThis as Global).map), bed.url("plan")) },
+  "two-layers": {
+    act: (page) =>
+      settled(page, (url) => new (globalThis as Global).map3d.imageLayer(url).addTo((globalThis as Global).map), bed.url("plan")),
+  },
   canvas: { map: { drawer: "canvas", zoom: 2.6, light: LOW } },
   dark: { context: { colorScheme: "dark" } },
   marker: { act: markers },
@@ -68,10 +90,17 @@ function markers(page: Page): Promise<unknown> {
 
 async function theme(page: Page): Promise<void> {
   await page.addScriptTag({ url: "/map3d-theme.js" });
-  await page.evaluate(() => new Promise<void>((done) => {
-    const g = globalThis as Global & { map3d: typeof Theme };
-    new g.map3d.theme(g.layer, "measuredHeight", { language: "en" }).addTo(g.map).once("ready", () => { g.map.once("idle", () => { done(); }); });
-  }));
+  await page.evaluate(
+    () =>
+      new Promise<void>((done) => {
+        const g = globalThis as Global & { map3d: typeof Theme };
+        new g.map3d.theme(g.layer, "measuredHeight", { language: "en" }).addTo(g.map).once("ready", () => {
+          g.map.once("idle", () => {
+            done();
+          });
+        });
+      }),
+  );
 }
 
 async function overview(page: Page): Promise<void> {
@@ -92,7 +121,10 @@ test.each(Object.entries(scenes))("%s", async (name, { map = {}, layer = {}, con
 
 /** The ready-made page, at a fixed time. */
 const pages: Record<string, { context: BrowserContextOptions; act: (page: Page) => Promise<unknown> }> = {
-  "page-phone": { context: { viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true }, act: (page) => page.touchscreen.tap(150, 420).then(() => page.waitForSelector("#info:not([hidden])")) },
+  "page-phone": {
+    context: { viewport: { width: 390, height: 844 }, isMobile: true, hasTouch: true },
+    act: (page) => page.touchscreen.tap(150, 420).then(() => page.waitForSelector("#info:not([hidden])")),
+  },
   "page-picture": { context: { viewport: { width: 720, height: 520 } }, act: (page) => page.locator("#make-picture").click() },
 };
 

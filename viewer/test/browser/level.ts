@@ -14,15 +14,20 @@ export function decodedLevel(town: Fixture, layer: "color" | "normal" | "id"): (
 }
 
 /** Returns the position of the view's top left corner on the map, CSS pixels. */
-export const cornerOf = (page: Page): Promise<[number, number]> => page.evaluate(() => {
-  const { map, layer } = globalThis as Global;
-  const view = layer.rendering?.views.get(map.direction);
-  if (!view) throw new Error("no view");
-  const { frame } = view;
-  const { right, up } = frame.axes;
-  const world = [0, 1, 2].map((k) => (layer.rendering?.json.origin[k] ?? 0) + frame.u0 * (right[k] ?? 0) + frame.v0 * (up[k] ?? 0)) as [number, number, number];
-  return map.project(world) as [number, number];
-});
+export const cornerOf = (page: Page): Promise<[number, number]> =>
+  page.evaluate(() => {
+    const { map, layer } = globalThis as Global;
+    const view = layer.rendering?.views.get(map.direction);
+    if (!view) throw new Error("no view");
+    const { frame } = view;
+    const { right, up } = frame.axes;
+    const world = [0, 1, 2].map((k) => (layer.rendering?.json.origin[k] ?? 0) + frame.u0 * (right[k] ?? 0) + frame.v0 * (up[k] ?? 0)) as [
+      number,
+      number,
+      number,
+    ];
+    return map.project(world) as [number, number];
+  });
 
 /** Returns the canvas pixel of level 3's first pixel. */
 export const placeOf = async (page: Page): Promise<[number, number]> => {

@@ -16,7 +16,15 @@ test("a box is visible exactly where it is nearer than the images, with equal br
   expect(found.wrong.slice(0, 5)).toEqual([]);
   expect([found.before > 2500, found.behind > 800]).toEqual([true, true]);
 
-  const evening: Light = { ...DEFAULT_LIGHT, azimuth_deg: 265, altitude_deg: 20, ambient: 0.3, diffuse: 0.9, sun_rgb: [1, 0.7, 0.4], sky_rgb: [0.6, 0.8, 1] };
+  const evening: Light = {
+    ...DEFAULT_LIGHT,
+    azimuth_deg: 265,
+    altitude_deg: 20,
+    ambient: 0.3,
+    diffuse: 0.9,
+    sun_rgb: [1, 0.7, 0.4],
+    sky_rgb: [0.6, 0.8, 1],
+  };
   await settled(page, (light) => (globalThis as Global).map.setLight(light), evening);
   await page.screenshot({ path: `${OUT}/model-evening.png` });
   expect((await judged(page, evening)).wrong.slice(0, 5)).toEqual([]);
@@ -31,7 +39,12 @@ test("a box is visible exactly where it is nearer than the images, with equal br
   expect(problems).toEqual([]);
 });
 
-test.each([[1, 2], [1, 3.6], [2, 2.6], [2, 4.3]])("the same at %d device pixels per CSS pixel and zoom %d", async (dpr, zoom) => {
+test.each([
+  [1, 2],
+  [1, 3.6],
+  [2, 2.6],
+  [2, 4.3],
+])("the same at %d device pixels per CSS pixel and zoom %d", async (dpr, zoom) => {
   const { page, problems } = await start({ zoom }, { deviceScaleFactor: dpr });
   await addBox(page);
   await page.screenshot({ path: `${OUT}/model-box-${String(dpr)}-${String(zoom)}.png` });
@@ -45,18 +58,29 @@ test.each([[1, 2], [1, 3.6], [2, 2.6], [2, 4.3]])("the same at %d device pixels 
 test.each(["0-45", "90-45"])("a lawn on the ground is entirely visible at every zoom in view %s", async (direction) => {
   const { page, problems } = await start({ direction, light: { lit: false } });
   const [x, y] = [-20, -60];
-  await settled(page, (position) => {
-    const g = globalThis as Modelling;
-    const lawn = new g.THREE.Mesh(new g.THREE.PlaneGeometry(30, 14).rotateX(-Math.PI / 2), new g.THREE.MeshBasicMaterial({ color: "#00ff00" }));
-    g.model = new g.map3d.modelLayer(g.THREE, lawn, { position }).addTo(g.map);
-  }, inTown(x, y, 0.02));
+  await settled(
+    page,
+    (position) => {
+      const g = globalThis as Modelling;
+      const lawn = new g.THREE.Mesh(
+        new g.THREE.PlaneGeometry(30, 14).rotateX(-Math.PI / 2),
+        new g.THREE.MeshBasicMaterial({ color: "#00ff00" }),
+      );
+      g.model = new g.map3d.modelLayer(g.THREE, lawn, { position }).addTo(g.map);
+    },
+    inTown(x, y, 0.02),
+  );
   for (const zoom of [1, 1.7, 2.5, 3, 4.3]) {
     await settled(page, ([at, to]) => (globalThis as Global).map.setView(at, to), [inTown(x, y, 0.03 * zoom), zoom] as const);
     const shot = await picture(page);
-    const [[left, bottom], [right, top]] = await page.evaluate((corners) => corners.map((at) => (globalThis as Global).map.project(at)), direction === "0-45" ? [inTown(x - 15, y - 7, 0), inTown(x + 15, y + 7, 0)] : [inTown(x + 15, y - 7, 0), inTown(x - 15, y + 7, 0)]) as [[number, number], [number, number]];
+    const [[left, bottom], [right, top]] = (await page.evaluate(
+      (corners) => corners.map((at) => (globalThis as Global).map.project(at)),
+      direction === "0-45" ? [inTown(x - 15, y - 7, 0), inTown(x + 15, y + 7, 0)] : [inTown(x + 15, y - 7, 0), inTown(x - 15, y + 7, 0)],
+    )) as [[number, number], [number, number]];
     const wrong: string[] = [];
     for (let j = Math.max(0, Math.ceil(top) + 1); j < Math.min(HIGH, bottom - 2); j++) {
-      for (let i = Math.max(0, Math.ceil(left) + 1); i < Math.min(WIDE, right - 2); i++) if (rgbAt(shot, i, j).join() !== "0,255,0") wrong.push(`${String(i)}, ${String(j)}`);
+      for (let i = Math.max(0, Math.ceil(left) + 1); i < Math.min(WIDE, right - 2); i++)
+        if (rgbAt(shot, i, j).join() !== "0,255,0") wrong.push(`${String(i)}, ${String(j)}`);
     }
     expect([zoom, wrong.slice(0, 3)]).toEqual([zoom, []]);
   }
@@ -66,10 +90,22 @@ test.each(["0-45", "90-45"])("a lawn on the ground is entirely visible at every 
 test("with screen-space light, a model that extends beyond the images is entirely visible", async () => {
   const { page, problems } = await start();
   await page.addScriptTag({ url: "/map3d-shade.js" });
-  await settled(page, () => { new (globalThis as unknown as { map3d: typeof Shading }).map3d.shade().addTo((globalThis as Global).map); }, null);
+  await settled(
+    page,
+    () => {
+      new (globalThis as unknown as { map3d: typeof Shading }).map3d.shade().addTo((globalThis as Global).map);
+    },
+    null,
+  );
   await addBox(page);
   expect((await judged(page, DEFAULT_LIGHT)).wrong.slice(0, 5)).toEqual([]);
-  await settled(page, (position) => { (globalThis as Modelling).model.setPosition(position); }, inTown(-29, -300, 300));
+  await settled(
+    page,
+    (position) => {
+      (globalThis as Modelling).model.setPosition(position);
+    },
+    inTown(-29, -300, 300),
+  );
   const [r = 0] = await seenAt(page, inTown(-29, -300, 324));
   expect(Math.abs(r - (lambert(WALL, [0, 0, 1], DEFAULT_LIGHT)[0] ?? 0))).toBeLessThanOrEqual(2);
   expect(problems).toEqual([]);
@@ -79,15 +115,25 @@ test("a white wall of a model has the brightness of the same wall in the images"
   const { page, problems } = await start();
   // The school's south wall and a model of it next to it, in the same colour.
   await addBox(page, { position: inTown(31, -62, 0) });
-  await settled(page, () => {
-    const { model, THREE } = globalThis as Modelling;
-    model.object?.traverse((node) => {
-      if (node instanceof THREE.Mesh) node.material = new THREE.MeshStandardMaterial({ color: new THREE.Color().setRGB(202 / 255, 205 / 255, 208 / 255, THREE.SRGBColorSpace), roughness: 1 });
-    });
-    model.redraw();
-  }, null);
+  await settled(
+    page,
+    () => {
+      const { model, THREE } = globalThis as Modelling;
+      model.object?.traverse((node) => {
+        if (node instanceof THREE.Mesh)
+          node.material = new THREE.MeshStandardMaterial({
+            color: new THREE.Color().setRGB(202 / 255, 205 / 255, 208 / 255, THREE.SRGBColorSpace),
+            roughness: 1,
+          });
+      });
+      model.redraw();
+    },
+    null,
+  );
   const [wall, model] = [await seenAt(page, inTown(30.8, -46, 0.6)), await seenAt(page, inTown(30.8, -67, 12))];
-  wall.forEach((byte, k) => { expect(Math.abs(byte - (model[k] ?? 0))).toBeLessThanOrEqual(6); });
+  wall.forEach((byte, k) => {
+    expect(Math.abs(byte - (model[k] ?? 0))).toBeLessThanOrEqual(6);
+  });
   expect(problems).toEqual([]);
 });
 
@@ -112,12 +158,17 @@ test("a click on the visible part of a model fires its event and the pointer sho
   await addBox(page);
   await page.evaluate(() => {
     const g = globalThis as Modelling & { hit: unknown };
-    g.model.on("click", ({ object, position, intersection }) => (g.hit = { object: object.type, position, distance: intersection.distance }));
+    g.model.on(
+      "click",
+      ({ object, position, intersection }) => (g.hit = { object: object.type, position, distance: intersection.distance }),
+    );
   });
   const top = inTown(-20, 23, 24);
   const { model, id } = await clicked(page, top);
   expect(model?.object).toBe("Mesh");
-  model?.position.forEach((part, k) => { expect(Math.abs(part - (top[k] ?? 0))).toBeLessThan(0.5); });
+  model?.position.forEach((part, k) => {
+    expect(Math.abs(part - (top[k] ?? 0))).toBeLessThan(0.5);
+  });
   expect(id).toBe(3_900_000_007); // the chapel behind it
   const over = (): Promise<string> => page.evaluate(() => getComputedStyle((globalThis as Global).map.canvas).cursor);
   await page.waitForFunction(() => (globalThis as Global).map.container.classList.contains("map3d-over-model"));

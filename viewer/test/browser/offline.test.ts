@@ -23,34 +23,46 @@ async function start(page: Page, rendering: string): Promise<void> {
   page.setDefaultTimeout(20_000);
   await page.goto(`${bed.server.origin}/bare`);
   await page.addScriptTag({ url: "/map3d-offline.js" });
-  await page.evaluate(([url, options]) => new Promise<void>((done) => {
-    const g = globalThis as Global;
-    g.map = new g.map3d.map("mapcanvas", options);
-    g.layer = new g.map3d.imageLayer(url).addTo(g.map);
-    g.errors = [];
-    g.map.on("error", ({ error }) => g.errors.push(error.message));
-    g.map.once("idle", () => { done(); });
-  }), [bed.url(rendering), VIEW] as const);
+  await page.evaluate(
+    ([url, options]) =>
+      new Promise<void>((done) => {
+        const g = globalThis as Global;
+        g.map = new g.map3d.map("mapcanvas", options);
+        g.layer = new g.map3d.imageLayer(url).addTo(g.map);
+        g.errors = [];
+        g.map.on("error", ({ error }) => g.errors.push(error.message));
+        g.map.once("idle", () => {
+          done();
+        });
+      }),
+    [bed.url(rendering), VIEW] as const,
+  );
 }
 
 /** Downloads the visible area; on request, stops after some tiles. */
-const download = (page: Page, stopAfter = Infinity): Promise<{ area?: Offline.StoredArea; why?: string; progress: Offline.AreaProgress[] }> => page.evaluate(async (most) => {
-  const g = globalThis as unknown as Kept;
-  const [ending, progress] = [new AbortController(), [] as Offline.AreaProgress[]];
-  try {
-    await g.map3d.registerWorker("/map3d-worker.js");
-    const area = await g.map3d.downloadArea(g.map, {
-      name: "tower", signal: ending.signal, files: ["/bare", "/bare.css", "/map3d.js", "/map3d-offline.js"],
-      onProgress: (now) => {
-        progress.push(now);
-        if (now.done === most) ending.abort(new Error("stopped"));
-      },
-    });
-    return { area, progress };
-  } catch (reason) {
-    return { why: String(reason), progress };
-  }
-}, stopAfter);
+const download = (
+  page: Page,
+  stopAfter = Infinity,
+): Promise<{ area?: Offline.StoredArea; why?: string; progress: Offline.AreaProgress[] }> =>
+  page.evaluate(async (most) => {
+    const g = globalThis as unknown as Kept;
+    const [ending, progress] = [new AbortController(), [] as Offline.AreaProgress[]];
+    try {
+      await g.map3d.registerWorker("/map3d-worker.js");
+      const area = await g.map3d.downloadArea(g.map, {
+        name: "tower",
+        signal: ending.signal,
+        files: ["/bare", "/bare.css", "/map3d.js", "/map3d-offline.js"],
+        onProgress: (now) => {
+          progress.push(now);
+          if (now.done === most) ending.abort(new Error("stopped"));
+        },
+      });
+      return { area, progress };
+    } catch (reason) {
+      return { why: String(reason), progress };
+    }
+  }, stopAfter);
 
 async function offline(page: Page, act: () => Promise<void>): Promise<void> {
   const port = Number(new URL(bed.server.origin).port);
@@ -82,7 +94,13 @@ test.each(["town", "published", "packed"])("an area of %s can be interrupted, re
 
   bed.server.requests.length = 0;
   const { area, progress } = await download(page);
-  expect(area).toMatchObject({ name: "tower", complete: true, tiles: estimate.tiles, directions: ["0-45", "90-45", "180-45", "270-45"], layers: rendering === "packed" ? ["color", "data"] : ["color", "normal", "id", "depth"] });
+  expect(area).toMatchObject({
+    name: "tower",
+    complete: true,
+    tiles: estimate.tiles,
+    directions: ["0-45", "90-45", "180-45", "270-45"],
+    layers: rendering === "packed" ? ["color", "data"] : ["color", "normal", "id", "depth"],
+  });
   expect(progress.at(-1)).toMatchObject({ done: estimate.tiles, total: estimate.tiles });
   const archives = rendering === "published" ? 16 * 16384 : 0; // their first reads, which outweigh tiles as small as these
   expect(Math.abs(((progress.at(-1)?.bytes ?? 0) - archives) / estimate.bytes - 1)).toBeLessThan(0.4);
@@ -98,17 +116,46 @@ test.each(["town", "published", "packed"])("an area of %s can be interrupted, re
       const { map, layer, errors } = globalThis as Global;
       const { id, approximate } = await map.pick(map.project([...tower]) ?? [0, 0]);
       const column = (await layer.attributes()).find(({ name }) => name === "measuredHeight");
-      return { id, approximate, name: (await layer.object(id))?.name, search: (await layer.search("TOW")).length, heights: column && (await layer.column(column)).size, errors };
+      return {
+        id,
+        approximate,
+        name: (await layer.object(id))?.name,
+        search: (await layer.search("TOW")).length,
+        heights: column && (await layer.column(column)).size,
+        errors,
+      };
     }, TOWER);
     expect(found).toEqual({ id: 2_000_000_001, approximate: false, name: "Tower", search: 2, heights: 5, errors: [] });
     for (const direction of ["180-45", "90-45"]) {
-      await page.evaluate((to) => new Promise<void>((done) => { (globalThis as Global).map.once("idle", () => { done(); }).setDirection(to); }), direction);
+      await page.evaluate(
+        (to) =>
+          new Promise<void>((done) => {
+            (globalThis as Global).map
+              .once("idle", () => {
+                done();
+              })
+              .setDirection(to);
+          }),
+        direction,
+      );
       expect(await page.evaluate("errors")).toEqual([]);
     }
-    await page.evaluate(() => { (globalThis as Global).map.setDirection("0-45").setView([690910, 5335925, 500], 3.5); });
+    await page.evaluate(() => {
+      (globalThis as Global).map.setDirection("0-45").setView([690910, 5335925, 500], 3.5);
+    });
     await expect.poll(() => page.evaluate<string[]>("errors"), { timeout: 20_000 }).not.toEqual([]);
     expect((await page.evaluate<string[]>("errors"))[0]).toMatch(/no response/);
-    await page.evaluate((tower) => new Promise<void>((done) => { (globalThis as Global).map.once("idle", () => { done(); }).setView([...tower], 3); }), TOWER);
+    await page.evaluate(
+      (tower) =>
+        new Promise<void>((done) => {
+          (globalThis as Global).map
+            .once("idle", () => {
+              done();
+            })
+            .setView([...tower], 3);
+        }),
+      TOWER,
+    );
     expect((await pixels(page)).equals(wanted)).toBe(true);
   });
 
@@ -125,7 +172,12 @@ test("a changed rendering is shown in its new state online, and the saved area i
   await start(page, "published");
   const before = await download(page);
   const view = town.json.views[1]?.id ?? "";
-  const files = new Map([...fixture.files].map(([path, bytes]) => [path, path.startsWith("0-45/") ? fixture.files.get(path.replace("0-45", view)) ?? bytes : bytes]));
+  const files = new Map(
+    [...fixture.files].map(([path, bytes]) => [
+      path,
+      path.startsWith("0-45/") ? (fixture.files.get(path.replace("0-45", view)) ?? bytes) : bytes,
+    ]),
+  );
   bed.server.renderings.set("published", { ...fixture, json: { ...fixture.json, content_version: 8 }, files });
   await start(page, "published");
   const after = await pixels(page);
@@ -143,25 +195,48 @@ test("a changed rendering is shown in its new state online, and the saved area i
 test("full storage, a missing worker and an unreachable host are errors", async () => {
   const { page } = await bed.openPage();
   await start(page, "town");
-  const failed = (act: string): Promise<string> => page.evaluate(`(async () => { try { return String(JSON.stringify(await (${act}))); } catch (error) { return error.name + ": " + error.message; } })()`);
+  const failed = (act: string): Promise<string> =>
+    page.evaluate(
+      `(async () => { try { return String(JSON.stringify(await (${act}))); } catch (error) { return error.name + ": " + error.message; } })()`,
+    );
   await page.evaluate(() => {
     const put = Object.getOwnPropertyDescriptor(Cache.prototype, "put") as PropertyDescriptor;
-    const full = (key: string): Promise<void> => (key.includes("/depth/") ? Promise.reject(new DOMException("no room", "QuotaExceededError")) : Promise.resolve());
-    Object.assign(globalThis, { full: () => Object.defineProperty(Cache.prototype, "put", { ...put, value: full }), roomy: () => Object.defineProperty(Cache.prototype, "put", put) });
+    const full = (key: string): Promise<void> =>
+      key.includes("/depth/") ? Promise.reject(new DOMException("no room", "QuotaExceededError")) : Promise.resolve();
+    Object.assign(globalThis, {
+      full: () => Object.defineProperty(Cache.prototype, "put", { ...put, value: full }),
+      roomy: () => Object.defineProperty(Cache.prototype, "put", put),
+    });
   });
-  expect(await failed("(full(), map3d.downloadArea(map, { files: [] }))")).toMatch(/^StorageError: storage is full: could not save http.*\/depth\/.*\(QuotaExceededError\); save a smaller area/);
+  expect(await failed("(full(), map3d.downloadArea(map, { files: [] }))")).toMatch(
+    /^StorageError: storage is full: could not save http.*\/depth\/.*\(QuotaExceededError\); save a smaller area/,
+  );
   await page.evaluate("void roomy()");
-  expect(await failed("(navigator.storage.estimate = async () => ({ quota: 1000, usage: 990 }), map3d.downloadArea(map, { files: [] }))")).toMatch(/^StorageError: not enough storage: the area needs about [\d.]+ MB, 0\.0 MB are available/);
+  expect(
+    await failed("(navigator.storage.estimate = async () => ({ quota: 1000, usage: 990 }), map3d.downloadArea(map, { files: [] }))"),
+  ).toMatch(/^StorageError: not enough storage: the area needs about [\d.]+ MB, 0\.0 MB are available/);
   await page.evaluate("delete navigator.storage.estimate");
-  expect(await failed('map3d.registerWorker("/nowhere/map3d-worker.js")')).toMatch(/^StorageError: cannot register \/nowhere\/map3d-worker\.js/);
+  expect(await failed('map3d.registerWorker("/nowhere/map3d-worker.js")')).toMatch(
+    /^StorageError: cannot register \/nowhere\/map3d-worker\.js/,
+  );
   expect(await failed('map3d.downloadArea(map, { files: ["/nowhere.css"] })')).toMatch(/^FetchError: .*\/nowhere\.css: HTTP 404/);
   expect(await failed("map3d.listAreas().then((areas) => areas.every(({ complete }) => !complete))")).toBe("true");
   bed.server.failures.set("/90-45/normal/", 3);
   expect(await failed("map3d.downloadArea(map, { files: [] }).then(({ complete }) => complete)")).toBe("true");
 });
 
-const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
-const rows: [string, BrowserContextOptions][] = [["desk", { viewport: { width: 1280, height: 800 } }], ["phone", { ...PHONE, locale: "de-DE" }], ["dark", { ...PHONE, colorScheme: "dark", locale: "fr-FR" }]];
+const PHONE = {
+  viewport: { width: 390, height: 844 },
+  deviceScaleFactor: 2,
+  isMobile: true,
+  hasTouch: true,
+  userAgent: devices["iPhone 14"].userAgent,
+};
+const rows: [string, BrowserContextOptions][] = [
+  ["desk", { viewport: { width: 1280, height: 800 } }],
+  ["phone", { ...PHONE, locale: "de-DE" }],
+  ["dark", { ...PHONE, colorScheme: "dark", locale: "fr-FR" }],
+];
 
 test.each(rows)("the page saves itself and the view for offline use: %s", async (name, options) => {
   const { page, problems } = await bed.openPage(options, { maps: true });
@@ -174,7 +249,10 @@ test.each(rows)("the page saves itself and the view for offline use: %s", async 
     return steady(page, () => page.screenshot({ clip: { x: width / 2 - 180, y: height / 2 - 160, width: 360, height: 300 } }));
   };
   const before = await open();
-  expect(await page.evaluate(async () => [await caches.keys(), (await navigator.serviceWorker.getRegistrations()).length])).toEqual([[], 0]);
+  expect(await page.evaluate(async () => [await caches.keys(), (await navigator.serviceWorker.getRegistrations()).length])).toEqual([
+    [],
+    0,
+  ]);
   await page.locator("#save-offline").click();
   await page.locator("#offline-save:enabled").waitFor();
   await page.screenshot({ path: `${OUT}/offline-${name}.png` });

@@ -27,10 +27,15 @@ async function pass(page: Page, seconds: number): Promise<void> {
 test("the page opens with a slow turn, which ends at the first touch and is shown once in a session", async () => {
   const { page, problems } = await open({});
   const first = await directionOf(page);
-  await expect.poll(async () => {
-    await pass(page, 1);
-    return directionOf(page);
-  }, { timeout: 30_000 }).not.toBe(first);
+  await expect
+    .poll(
+      async () => {
+        await pass(page, 1);
+        return directionOf(page);
+      },
+      { timeout: 30_000 },
+    )
+    .not.toBe(first);
   await page.screenshot({ path: `${OUT}/opening.png` });
   await page.mouse.move(320, 200);
   await page.mouse.down();

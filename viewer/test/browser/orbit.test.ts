@@ -18,16 +18,21 @@ type Orbiting = Global & { map3d: typeof Orbit; orbit: Orbit.orbit };
 async function start(options: object = {}, duration_ms = 300): ReturnType<TestBed["start"]> {
   const opened = await bed.start("town", { zoom: 3, direction: "0-45", light: { lit: false }, ...options }, {}, VIEWPORT);
   await opened.page.addScriptTag({ url: "/map3d-orbit.js" });
-  await settled(opened.page, (ms) => {
-    const g = globalThis as Orbiting;
-    g.orbit = new g.map3d.orbit({ duration_ms: ms }).addTo(g.map);
-  }, duration_ms);
+  await settled(
+    opened.page,
+    (ms) => {
+      const g = globalThis as Orbiting;
+      g.orbit = new g.map3d.orbit({ duration_ms: ms }).addTo(g.map);
+    },
+    duration_ms,
+  );
   return opened;
 }
 
-const twist = (page: Page, deg: number): Promise<void> => page.evaluate((angle) => {
-  (globalThis as Global).map.rotateBy((angle * Math.PI) / 180);
-}, deg);
+const twist = (page: Page, deg: number): Promise<void> =>
+  page.evaluate((angle) => {
+    (globalThis as Global).map.rotateBy((angle * Math.PI) / 180);
+  }, deg);
 
 /** Waits until the tiles of the other view have arrived, and the picture is still. */
 async function still(page: Page): Promise<Buffer> {
@@ -37,9 +42,16 @@ async function still(page: Page): Promise<Buffer> {
 
 /** Fraction of the pixels whose colour is that of a ray along the current direction, and fraction that show something. */
 async function agreement(page: Page, shot: Buffer, lookAt: number): Promise<{ right: number; shown: number }> {
-  const [corner, px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin) as [number, number], (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
+  const [corner, px] = await page.evaluate(
+    (origin) => [(globalThis as Global).map.project(origin) as [number, number], (globalThis as Global).map.metresPerPixel] as const,
+    ORIGIN,
+  );
   const { json } = town;
-  const frame = { ...makeFrame(json.views[0] as (typeof json.views)[0], json.size_m, json.tile_px, json.zmax), axes: computeAxes(lookAt, 45), d0: -2000 };
+  const frame = {
+    ...makeFrame(json.views[0] as (typeof json.views)[0], json.size_m, json.tile_px, json.zmax),
+    axes: computeAxes(lookAt, 45),
+    d0: -2000,
+  };
   let [right, shown, all] = [0, 0, 0];
   for (let y = 1; y < HIGH; y += 3) {
     for (let x = 1; x < WIDE; x += 3) {
@@ -65,7 +77,13 @@ test("a gesture between two views shows the picture of a ray caster; on release 
     expect((await agreement(page, await still(page), at)).right).toBeGreaterThan(0.9);
   }
   await twist(page, -20); // at 25 degrees: back is nearer
-  await settled(page, () => { (globalThis as Global).map.endGesture(); }, null);
+  await settled(
+    page,
+    () => {
+      (globalThis as Global).map.endGesture();
+    },
+    null,
+  );
   expect(await page.evaluate(() => (globalThis as Global).map.direction)).toBe("0-45");
   expect((await agreement(page, await picture(page), 0)).right).toBeGreaterThan(0.95);
   expect(problems).toEqual([]);
@@ -91,7 +109,9 @@ test("a transition ends in the picture of an immediate change; markers move alon
     let count = 0;
     map.on("move", () => count++);
     await new Promise<void>((done) => {
-      map.once("idle", () => { done(); });
+      map.once("idle", () => {
+        done();
+      });
       map.setDirection("90-45");
     });
     return count;
@@ -102,10 +122,19 @@ test("a transition ends in the picture of an immediate change; markers move alon
   await page.context().close();
 
   const { page: flat, problems: none } = await start({ drawer: "canvas" });
-  expect(await flat.evaluate(() => new Promise((done) => {
-    const { map } = globalThis as Global;
-    map.once("directionchange", () => { done(map.container.querySelectorAll("canvas").length); }).setDirection("90-45");
-  }))).toBe(2);
+  expect(
+    await flat.evaluate(
+      () =>
+        new Promise((done) => {
+          const { map } = globalThis as Global;
+          map
+            .once("directionchange", () => {
+              done(map.container.querySelectorAll("canvas").length);
+            })
+            .setDirection("90-45");
+        }),
+    ),
+  ).toBe(2);
   await flat.waitForFunction(() => document.querySelectorAll("canvas").length === 1);
   expect(none).toEqual([]);
 });

@@ -5,7 +5,6 @@ import { TestBed } from "./testBed";
 import { OUT, resting } from "./browser";
 import { steady } from "./page";
 
-
 const drawn = new TestBed({ town: renderTown(256, 0.38), unnamed: withoutNames(renderTown(256, 0.38)) });
 const bed = new TestBed(drawn.server, { draws: false });
 
@@ -16,26 +15,45 @@ function withoutNames(fixture: Fixture): Fixture {
     change(json);
     fixture.files.set(path, new TextEncoder().encode(JSON.stringify(json)));
   };
-  const put = (id: number, change: object): void => { edit(`objects/${String(Math.floor(id / 1024))}.json`, ({ objects }) => { Object.assign(objects[String(id)] as object, change); }); };
+  const put = (id: number, change: object): void => {
+    edit(`objects/${String(Math.floor(id / 1024))}.json`, ({ objects }) => {
+      Object.assign(objects[String(id)] as object, change);
+    });
+  };
   put(2_000_000_001, { name: "DEBY_LOD2_4959323", attributes: { address: "Marktplatz 1" } });
   put(3_900_000_007, { name: "UUID_77", attributes: { function: "Kirche" } });
   put(1025, { parent: 17 });
   edit("objects/search.json", (json) => {
-    json.entries = [[3_900_000_007, "Kirche", [-28, 47, 20], "uuid 77 church eglise"], [2_000_000_001, "Marktplatz 1", [32, 26, 62], "deby lod2 4959323"], [17, "building", [-45, -4, 34], "school old"]];
+    json.entries = [
+      [3_900_000_007, "Kirche", [-28, 47, 20], "uuid 77 church eglise"],
+      [2_000_000_001, "Marktplatz 1", [32, 26, 62], "deby lod2 4959323"],
+      [17, "building", [-45, -4, 34], "school old"],
+    ];
   });
   return fixture;
 }
 
 // Two device pixels per CSS pixel: three take twice as long without a GPU, and only few tests need them.
-const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent };
+const PHONE = {
+  viewport: { width: 390, height: 844 },
+  deviceScaleFactor: 2,
+  isMobile: true,
+  hasTouch: true,
+  userAgent: devices["iPhone 14"].userAgent,
+};
 const DESK = { viewport: { width: 1280, height: 800 } };
 /** For tests that look at pixels. */
 const SMALL = { viewport: { width: 800, height: 500 } };
 
 /** The page with the town, at rest. */
-const open = (options: object, query = bed.url("town"), from = bed): Promise<{ page: Page; problems: string[] }> => from.openReadyMade(query, options);
+const open = (options: object, query = bed.url("town"), from = bed): Promise<{ page: Page; problems: string[] }> =>
+  from.openReadyMade(query, options);
 
-for (const [name, options] of [["desk", DESK], ["phone", PHONE], ["dark", { ...DESK, colorScheme: "dark" }]] as const) {
+for (const [name, options] of [
+  ["desk", DESK],
+  ["phone", PHONE],
+  ["dark", { ...DESK, colorScheme: "dark" }],
+] as const) {
   test(`${name}: the page opens, searches, shows and closes an object without browser or CSP errors`, async () => {
     const { page, problems } = await open(options);
     await page.screenshot({ path: `${OUT}/${name}-open.png` });
@@ -51,7 +69,7 @@ for (const [name, options] of [["desk", DESK], ["phone", PHONE], ["dark", { ...D
     expect(await page.locator("#info h2").textContent()).toBe("School <b>old</b>");
     expect(await page.locator("#info img").count()).toBe(0);
     expect(await page.locator(".map3d-marker").allTextContents()).toEqual([expect.stringContaining("School <b>old</b>")]);
-    const pin = await page.locator(".map3d-marker").boundingBox() as { x: number; y: number; width: number; height: number };
+    const pin = (await page.locator(".map3d-marker").boundingBox()) as { x: number; y: number; width: number; height: number };
     await page.locator("#info .close").click();
     expect(await page.locator(".map3d-marker").count()).toBe(0);
     await page.mouse.click(pin.x + pin.width / 2 - 60, pin.y + pin.height + 60);
@@ -70,10 +88,17 @@ test("the light slider and the display mode change the picture", async () => {
   /** Waits for a picture that has not been shown before. */
   const changed = async (name: string): Promise<void> => {
     let shot = "";
-    await expect.poll(async () => {
-      shot = (await page.screenshot({ path: `${OUT}/${name}.png`, clip: { x: 240, y: 100, width: 320, height: 300 } })).toString("base64");
-      return shots.includes(shot);
-    }, { timeout: 60_000, interval: 300 }).toBe(false);
+    await expect
+      .poll(
+        async () => {
+          shot = (await page.screenshot({ path: `${OUT}/${name}.png`, clip: { x: 240, y: 100, width: 320, height: 300 } })).toString(
+            "base64",
+          );
+          return shots.includes(shot);
+        },
+        { timeout: 60_000, interval: 300 },
+      )
+      .toBe(false);
     shots.push(shot);
   };
   await changed("mode-lit");
@@ -102,8 +127,12 @@ test("a bar shows that a turn waits for its tiles", async () => {
   await page.waitForSelector("#loading", { state: "hidden" });
   const release = bed.server.hold("/180-45/");
   try {
-    await page.evaluate(() => { document.querySelector<HTMLElement>("#mapcanvas")?.focus(); });
-    await page.evaluate(() => { location.hash = location.hash.replace("0-45", "90-45"); });
+    await page.evaluate(() => {
+      document.querySelector<HTMLElement>("#mapcanvas")?.focus();
+    });
+    await page.evaluate(() => {
+      location.hash = location.hash.replace("0-45", "90-45");
+    });
     await page.waitForSelector("#loading", { state: "hidden" });
     await page.getByRole("button", { name: "Turn view counter-clockwise" }).click();
     await page.waitForSelector("#loading", { state: "visible" });
@@ -125,13 +154,19 @@ test("a missing rendering shows a message", async () => {
 
 test("controls are at least 44 pixels large and have names", async () => {
   const { page } = await open(PHONE);
-  const small = await page.evaluate(() => [...document.querySelectorAll<HTMLElement>("button, input")].filter((found) => found.offsetParent !== null).flatMap((found) => {
-    const area = found.matches("#modes input") ? (found.parentElement as HTMLElement) : found;
-    const { width, height } = area.getBoundingClientRect();
-    const tall = found.matches("#modes input") ? height + 12 : height;
-    const named = found.getAttribute("aria-label") ?? found.textContent;
-    return width < 44 || tall < 44 || (named === "" && !found.matches("#modes input")) ? [`${found.outerHTML.slice(0, 80)} ${String(width)} × ${String(height)}`] : [];
-  }));
+  const small = await page.evaluate(() =>
+    [...document.querySelectorAll<HTMLElement>("button, input")]
+      .filter((found) => found.offsetParent !== null)
+      .flatMap((found) => {
+        const area = found.matches("#modes input") ? (found.parentElement as HTMLElement) : found;
+        const { width, height } = area.getBoundingClientRect();
+        const tall = found.matches("#modes input") ? height + 12 : height;
+        const named = found.getAttribute("aria-label") ?? found.textContent;
+        return width < 44 || tall < 44 || (named === "" && !found.matches("#modes input"))
+          ? [`${found.outerHTML.slice(0, 80)} ${String(width)} × ${String(height)}`]
+          : [];
+      }),
+  );
   expect(small).toEqual([]);
 });
 
@@ -140,7 +175,9 @@ test("the first phone view costs less than 1 MB with the script and the manifest
   const session = await page.context().newCDPSession(page);
   await session.send("Network.enable");
   let bytes = 0;
-  session.on("Network.loadingFinished", ({ encodedDataLength }) => { bytes += encodedDataLength; });
+  session.on("Network.loadingFinished", ({ encodedDataLength }) => {
+    bytes += encodedDataLength;
+  });
   await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}`);
   await resting(page);
   console.log(`first phone view: ${String(bytes)} bytes`);
@@ -174,8 +211,12 @@ test("view, time and selection are in the URL; the back button undoes a selectio
 test("changing the URL fragment changes the view", async () => {
   const { page, problems } = await open(DESK);
   const place = "#90-45/691032.0/5336026.0/562.0/4.00";
-  await page.evaluate((hash) => { location.hash = hash; }, place);
-  await page.waitForFunction(() => [...(globalThis as unknown as { maps: Set<{ direction: string }> }).maps].some(({ direction }) => direction === "90-45"));
+  await page.evaluate((hash) => {
+    location.hash = hash;
+  }, place);
+  await page.waitForFunction(() =>
+    [...(globalThis as unknown as { maps: Set<{ direction: string }> }).maps].some(({ direction }) => direction === "90-45"),
+  );
   await resting(page);
   const [, direction, x, y, z, zoom] = /^#(.+?)\/(.+?)\/(.+?)\/(.+?)\/(.+?)\//.exec(`${await page.evaluate(() => location.hash)}/`) ?? [];
   expect([direction, zoom]).toEqual(["90-45", "4.00"]);
@@ -185,7 +226,10 @@ test("changing the URL fragment changes the view", async () => {
   expect(problems).toEqual([]);
 });
 
-for (const [name, options] of [["desk", DESK], ["phone", PHONE]] as const) {
+for (const [name, options] of [
+  ["desk", DESK],
+  ["phone", PHONE],
+] as const) {
   test(`${name}: objects are coloured by an attribute; the legend filters; the URL keeps it`, async () => {
     const { page, problems } = await open(options);
     if (name === "phone") {
@@ -229,8 +273,14 @@ test.each([
   await page.waitForSelector("#results li");
   await page.keyboard.press("Enter");
   await page.waitForSelector("#info:not([hidden])");
-  expect(await page.locator("#info details dd").first().textContent()).toMatch(locale === "fr-FR" ? /^6910\d\d,\d\d; 53360\d\d,\d\d$/ : /^6910\d\d\.\d\d, 53360\d\d\.\d\d$/);
-  const english = await page.evaluate(() => [...document.querySelectorAll<HTMLElement>("button, input, select, [role]")].map((found) => found.getAttribute("aria-label") ?? "").filter((label) => /\b(the|of|view|search|look|light)\b/i.test(label)));
+  expect(await page.locator("#info details dd").first().textContent()).toMatch(
+    locale === "fr-FR" ? /^6910\d\d,\d\d; 53360\d\d,\d\d$/ : /^6910\d\d\.\d\d, 53360\d\d\.\d\d$/,
+  );
+  const english = await page.evaluate(() =>
+    [...document.querySelectorAll<HTMLElement>("button, input, select, [role]")]
+      .map((found) => found.getAttribute("aria-label") ?? "")
+      .filter((label) => /\b(the|of|view|search|look|light)\b/i.test(label)),
+  );
   expect(english).toEqual([]);
   expect(problems).toEqual([]);
 });
@@ -269,7 +319,11 @@ test("Enter picks what is at the centre of the map", async () => {
 
 test("search, pins and the list show what people say, and never an identifier", async () => {
   const { page, problems } = await open(DESK, bed.url("unnamed"));
-  for (const [text, result, pin] of [["église", "Kirche", "Kirche"], ["4959323", "Marktplatz 1", "Marktplatz 1"], ["school", "Building", "Town hall"]] as const) {
+  for (const [text, result, pin] of [
+    ["église", "Kirche", "Kirche"],
+    ["4959323", "Marktplatz 1", "Marktplatz 1"],
+    ["school", "Building", "Town hall"],
+  ] as const) {
     await page.fill("#query", text);
     await page.waitForFunction((label) => document.querySelector("#results li")?.textContent === label, result);
     await page.keyboard.press("Enter");
@@ -289,20 +343,24 @@ test("search, pins and the list show what people say, and never an identifier", 
 });
 
 /** Left, top, right and bottom of what the header and the card leave free, and the point that a marker stands on, once it rests. */
-const landing = (page: Page): Promise<{ free: readonly [number, number, number, number]; at: readonly [number, number] }> => page.evaluate(async () => {
-  const tip = (): readonly [number, number] => {
-    const { left, right, bottom } = (document.querySelector(".map3d-marker") as Element).getBoundingClientRect();
-    return [(left + right) / 2, bottom];
-  };
-  for (let last = "", rests = 0; rests < 10; rests = last === String(tip()) ? rests + 1 : 0) {
-    last = String(tip());
-    await new Promise(requestAnimationFrame);
-  }
-  const card = (document.querySelector("#info") as Element).getBoundingClientRect();
-  return { free: card.left > 0 ? [0, 0, card.left, innerHeight] : [0, 0, innerWidth, card.top], at: tip() };
-});
+const landing = (page: Page): Promise<{ free: readonly [number, number, number, number]; at: readonly [number, number] }> =>
+  page.evaluate(async () => {
+    const tip = (): readonly [number, number] => {
+      const { left, right, bottom } = (document.querySelector(".map3d-marker") as Element).getBoundingClientRect();
+      return [(left + right) / 2, bottom];
+    };
+    for (let last = "", rests = 0; rests < 10; rests = last === String(tip()) ? rests + 1 : 0) {
+      last = String(tip());
+      await new Promise(requestAnimationFrame);
+    }
+    const card = (document.querySelector("#info") as Element).getBoundingClientRect();
+    return { free: card.left > 0 ? [0, 0, card.left, innerHeight] : [0, 0, innerWidth, card.top], at: tip() };
+  });
 
-test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: every pick of a search ends at what it found, beside its card", async (_name, options) => {
+test.each([
+  ["desk", DESK],
+  ["phone", PHONE],
+] as const)("%s: every pick of a search ends at what it found, beside its card", async (_name, options) => {
   const { page, problems } = await open(options, bed.url("unnamed"));
   for (const text of ["église", "4959323", "school", "4959323", "église"]) {
     await page.fill("#query", text);
@@ -310,7 +368,10 @@ test.each([["desk", DESK], ["phone", PHONE]] as const)("%s: every pick of a sear
     await page.keyboard.press("Enter");
     await page.waitForSelector("#info:not([hidden])");
     const { free, at } = await landing(page);
-    expect([Math.abs(at[0] / (free[0] + free[2]) - 0.5), Math.abs(at[1] / (free[1] + free[3]) - 0.5)].map((off) => off < 0.1), `${text}: ${String(at)} in ${String(free)}`).toEqual([true, true]);
+    expect(
+      [Math.abs(at[0] / (free[0] + free[2]) - 0.5), Math.abs(at[1] / (free[1] + free[3]) - 0.5)].map((off) => off < 0.1),
+      `${text}: ${String(at)} in ${String(free)}`,
+    ).toEqual([true, true]);
   }
   expect(problems).toEqual([]);
 });
@@ -336,23 +397,33 @@ test("a gesture ends the flight to what a search found", async () => {
 test("a rendering of another origin is shown only with the user's consent", async () => {
   const other = bed.url("town").replace("127.0.0.1", "other.test");
   for (const consents of [true, false]) {
-    for (const query of [`rendering=${other}`, `rendering=${bed.url("town")}&rendering=${other}`, `rendering=${bed.url("town")}&with=${other}`]) {
+    for (const query of [
+      `rendering=${other}`,
+      `rendering=${bed.url("town")}&rendering=${other}`,
+      `rendering=${bed.url("town")}&with=${other}`,
+    ]) {
       const { page } = await bed.openPage(DESK);
       await page.route("http://other.test:*/**", async (route) => {
         await route.fulfill({ response: await route.fetch({ url: route.request().url().replace("other.test", "127.0.0.1") }) });
       });
-      const asked: string[] = [], fetched: string[] = [];
-      page.on("request", (request) => { if (new URL(request.url()).hostname === "other.test") fetched.push(request.url()); });
+      const asked: string[] = [],
+        fetched: string[] = [];
+      page.on("request", (request) => {
+        if (new URL(request.url()).hostname === "other.test") fetched.push(request.url());
+      });
       page.on("dialog", (dialog) => {
         asked.push(dialog.message());
         void (consents ? dialog.accept() : dialog.dismiss());
       });
       await page.goto(`${bed.server.origin}/?${query}`);
-      await page.waitForFunction((isShown) => (isShown ? location.hash.length > 5 : document.querySelector(".failed") !== null), consents || query.includes("with="));
+      await page.waitForFunction(
+        (isShown) => (isShown ? location.hash.length > 5 : document.querySelector(".failed") !== null),
+        consents || query.includes("with="),
+      );
       await page.waitForLoadState("networkidle");
       expect(asked).toEqual([`Show the map at ${other}?`]);
       expect(fetched.length > 0).toBe(consents);
-      await page.unrouteAll({ behavior: "ignoreErrors" });  // tiles may still be on their way
+      await page.unrouteAll({ behavior: "ignoreErrors" }); // tiles may still be on their way
       await page.context().close();
     }
   }

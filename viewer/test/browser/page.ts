@@ -4,7 +4,8 @@ import { decodePng, type DecodedPng } from "../../src/core/png";
 import type * as M from "../../src/map3d";
 
 /** A bare page with the canvas of README's example. */
-export const BARE = '<!doctype html><html><head><meta charset="utf-8"><title>test</title><link rel="icon" href="data:,"><link rel="stylesheet" href="/bare.css"></head><body><canvas id="mapcanvas"></canvas><script src="/map3d.js"></script></body></html>';
+export const BARE =
+  '<!doctype html><html><head><meta charset="utf-8"><title>test</title><link rel="icon" href="data:,"><link rel="stylesheet" href="/bare.css"></head><body><canvas id="mapcanvas"></canvas><script src="/map3d.js"></script></body></html>';
 
 export interface Started {
   map: M.map;
@@ -23,23 +24,34 @@ export function begin([urls, mapOptions, layerOptions]: readonly [string | strin
     g.clicks = [];
     g.map.on("error", ({ error }) => g.errors.push(error.message));
     g.map.on("click", (event) => g.clicks.push(event));
-    g.map.once("idle", () => { done(); });
+    g.map.once("idle", () => {
+      done();
+    });
   });
 }
 
 /** Runs a function in the page and waits until the map rests again. */
 export function settled<A>(page: Page, act: (argument: A) => unknown, argument: A): Promise<void> {
-  return page.evaluate(([code, given]) => new Promise<void>((done) => {
-    (globalThis as Global).map.once("idle", () => { done(); });
-    (globalThis as unknown as { eval(code: string): (argument: unknown) => unknown }).eval(code)(given);
-  }), [`(${act.toString()})`, argument] as const);
+  return page.evaluate(
+    ([code, given]) =>
+      new Promise<void>((done) => {
+        (globalThis as Global).map.once("idle", () => {
+          done();
+        });
+        (globalThis as unknown as { eval(code: string): (argument: unknown) => unknown }).eval(code)(given);
+      }),
+    [`(${act.toString()})`, argument] as const,
+  );
 }
 
 /** Waits until the map has drawn everything in view and nothing moves. */
 export const drawn = (page: Page): Promise<unknown> => page.waitForFunction(() => (globalThis as Global).map.loaded());
 
 /** Waits until all transitions of the page's styles have ended. */
-export const animationsEnd = (page: Page): Promise<unknown> => page.waitForFunction(() => document.getAnimations().every((each) => each.playState !== "running" || each.effect?.getComputedTiming().iterations === Infinity));
+export const animationsEnd = (page: Page): Promise<unknown> =>
+  page.waitForFunction(() =>
+    document.getAnimations().every((each) => each.playState !== "running" || each.effect?.getComputedTiming().iterations === Infinity),
+  );
 
 /** Reads until a value stays the same, and returns it. @param times how often it is read again */
 export async function steady<T>(page: Page, read: () => Promise<T>, times = 1): Promise<T> {
@@ -73,10 +85,13 @@ export async function pixels(page: Page): Promise<Buffer> {
     const { canvas } = (globalThis as Global).map;
     const gl = canvas.getContext("webgl2");
     const [row, height] = [4 * canvas.width, canvas.height];
-    const data = gl ? new Uint8Array(row * height) : canvas.getContext("2d")?.getImageData(0, 0, canvas.width, height).data ?? new Uint8ClampedArray();
+    const data = gl
+      ? new Uint8Array(row * height)
+      : (canvas.getContext("2d")?.getImageData(0, 0, canvas.width, height).data ?? new Uint8ClampedArray());
     gl?.readPixels(0, 0, canvas.width, height, gl.RGBA, gl.UNSIGNED_BYTE, data);
     let out = "";
-    for (let k = 0, j = gl ? height - 1 : 0; k < height; k++, j += gl ? -1 : 1) for (let i = 0; i < row; i += 400) out += String.fromCharCode(...data.subarray(row * j + i, row * j + Math.min(i + 400, row)));
+    for (let k = 0, j = gl ? height - 1 : 0; k < height; k++, j += gl ? -1 : 1)
+      for (let i = 0; i < row; i += 400) out += String.fromCharCode(...data.subarray(row * j + i, row * j + Math.min(i + 400, row)));
     return btoa(out);
   });
   return Buffer.from(text, "base64");

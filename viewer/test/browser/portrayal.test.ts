@@ -14,16 +14,28 @@ const litBed = new TestBed({ town: withBakedLight(town) });
 type Showing = Global & { map3d: typeof Portrayal };
 
 /** Opens a map with a layer of the service, and waits until it rests. */
-async function start(options: Record<string, unknown>, mapOptions: object = {}, context: BrowserContextOptions = {}, from = bed): Promise<{ page: Page; problems: string[] }> {
+async function start(
+  options: Record<string, unknown>,
+  mapOptions: object = {},
+  context: BrowserContextOptions = {},
+  from = bed,
+): Promise<{ page: Page; problems: string[] }> {
   const opened = await from.bare(context);
   await opened.page.addScriptTag({ url: "/map3d-portrayal.js" });
-  await opened.page.evaluate(async ([service, given, forMap]) => {
-    const g = globalThis as unknown as Showing;
-    const { map: Map, imageLayer: Layer } = (globalThis as unknown as Global).map3d;
-    g.map = new Map("mapcanvas", { preserveDrawingBuffer: true, language: "en", ...forMap });
-    g.layer = new Layer(g.map3d.portrayalSource(service, given)).addTo(g.map);
-    await new Promise<void>((done) => { g.map.once("idle", () => { done(); }); });
-  }, [`${from.server.origin}/3dps`, options, mapOptions] as const);
+  await opened.page.evaluate(
+    async ([service, given, forMap]) => {
+      const g = globalThis as unknown as Showing;
+      const { map: Map, imageLayer: Layer } = (globalThis as unknown as Global).map3d;
+      g.map = new Map("mapcanvas", { preserveDrawingBuffer: true, language: "en", ...forMap });
+      g.layer = new Layer(g.map3d.portrayalSource(service, given)).addTo(g.map);
+      await new Promise<void>((done) => {
+        g.map.once("idle", () => {
+          done();
+        });
+      });
+    },
+    [`${from.server.origin}/3dps`, options, mapOptions] as const,
+  );
   return opened;
 }
 
@@ -54,7 +66,11 @@ test.each(["webgl", "canvas"] as const)("shadows and occlusion of a service equa
     seen.set(name, await pixels(page));
     expect(problems).toEqual([]);
     const asked = litBed.server.requests.filter((url) => url.includes("GetView")).join(" ");
-    expect([asked.includes("SUN"), asked.includes("&sun=200,50"), asked.includes("AO")]).toEqual([name !== "neither", name !== "neither", name === "both"]);
+    expect([asked.includes("SUN"), asked.includes("&sun=200,50"), asked.includes("AO")]).toEqual([
+      name !== "neither",
+      name !== "neither",
+      name === "both",
+    ]);
     if (name === "both") await page.screenshot({ path: `${OUT}/portrayal-light-${drawer}.png` });
     await page.context().close();
   }
@@ -64,7 +80,11 @@ test.each(["webgl", "canvas"] as const)("shadows and occlusion of a service equa
 
 test("on a phone, with one request for each image", async () => {
   bed.server.requests.length = 0;
-  const { page, problems } = await start({ multipart: false }, { language: "de" }, { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true });
+  const { page, problems } = await start(
+    { multipart: false },
+    { language: "de" },
+    { viewport: { width: 390, height: 844 }, deviceScaleFactor: 3, isMobile: true, hasTouch: true },
+  );
   expect(bed.server.requests.some((url) => url.includes("IMAGELAYERS=COLOR;"))).toBe(true);
   expect(bed.server.requests.filter((url) => /IMAGELAYERS=\w+,/.test(url))).toEqual([]);
   await page.screenshot({ path: `${OUT}/portrayal-phone.png` });
@@ -83,15 +103,20 @@ test.each<[string, Record<string, unknown>, string]>([
 ])("the map names the error: %s", async (_, options, words) => {
   const { page } = await undrawn.bare();
   await page.addScriptTag({ url: "/map3d-portrayal.js" });
-  const message = await page.evaluate(async ([service, given]) => {
-    const g = globalThis as unknown as Showing;
-    const { map: Map, imageLayer: Layer } = (globalThis as unknown as Global).map3d;
-    const shown = new Map("mapcanvas");
-    return new Promise<string>((done) => {
-      shown.on("error", ({ error }) => { done(`${error.name}: ${error.message}`); });
-      new Layer(g.map3d.portrayalSource(service, given)).addTo(shown);
-    });
-  }, [`${bed.server.origin}/3dps`, options] as const);
+  const message = await page.evaluate(
+    async ([service, given]) => {
+      const g = globalThis as unknown as Showing;
+      const { map: Map, imageLayer: Layer } = (globalThis as unknown as Global).map3d;
+      const shown = new Map("mapcanvas");
+      return new Promise<string>((done) => {
+        shown.on("error", ({ error }) => {
+          done(`${error.name}: ${error.message}`);
+        });
+        new Layer(g.map3d.portrayalSource(service, given)).addTo(shown);
+      });
+    },
+    [`${bed.server.origin}/3dps`, options] as const,
+  );
   expect(message).toContain("UsageError: ");
   expect(message).toContain(words);
 });

@@ -15,24 +15,41 @@ export function recordDrawing(): void {
   const constants = WebGL2RenderingContext as unknown as Record<string, number>;
   const counted: Record<string, keyof Recorded> = { drawArrays: "draws", texSubImage2D: "uploads", texImage2D: "uploads", clear: "frames" };
   const answers: Record<string, () => unknown> = {
-    getParameter: () => "a GPU", getProgramParameter: () => true, getUniformLocation: () => ({}), isContextLost: () => false, getExtension: () => null,
-    checkFramebufferStatus: () => constants["FRAMEBUFFER_COMPLETE"], getError: () => 0,
+    getParameter: () => "a GPU",
+    getProgramParameter: () => true,
+    getUniformLocation: () => ({}),
+    isContextLost: () => false,
+    getExtension: () => null,
+    checkFramebufferStatus: () => constants["FRAMEBUFFER_COMPLETE"],
+    getError: () => 0,
   };
   const answerOf = (name: string): unknown => {
     if (/^[A-Z]/.test(name)) return constants[name];
     const count = counted[name];
-    if (count !== undefined) return () => { recorded[count]++; };
+    if (count !== undefined)
+      return () => {
+        recorded[count]++;
+      };
     return answers[name] ?? (name.startsWith("create") ? () => ({}) : () => undefined);
   };
   const make = (canvas: HTMLCanvasElement): WebGL2RenderingContext => {
     const members = new Map<string, unknown>([["canvas", canvas]]);
-    return new Proxy({}, { get: (_, name) => {
-      if (!members.has(String(name))) members.set(String(name), answerOf(String(name)));
-      return members.get(String(name));
-    } }) as WebGL2RenderingContext;
+    return new Proxy(
+      {},
+      {
+        get: (_, name) => {
+          if (!members.has(String(name))) members.set(String(name), answerOf(String(name)));
+          return members.get(String(name));
+        },
+      },
+    ) as WebGL2RenderingContext;
   };
   const contexts = new WeakMap<HTMLCanvasElement, WebGL2RenderingContext>();
-  const own = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (this: HTMLCanvasElement, kind: string, options?: object) => RenderingContext | null;
+  const own = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, "getContext")?.value as (
+    this: HTMLCanvasElement,
+    kind: string,
+    options?: object,
+  ) => RenderingContext | null;
   HTMLCanvasElement.prototype.getContext = function (this: HTMLCanvasElement, kind: string, options?: object): RenderingContext | null {
     const known = contexts.get(this);
     if (kind !== "webgl2") return known ? null : own.call(this, kind, options);

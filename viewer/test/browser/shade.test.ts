@@ -26,7 +26,9 @@ const frame = makeFrame(numbers, town.json.size_m, town.json.tile_px, town.json.
 
 const addShade = (options: object): unknown => {
   const g = globalThis as Global & { shade: { remove(): void } };
-  const made = new (g.map3d as unknown as { shade: new (options: object) => { addTo(map: unknown): never; remove(): void } }).shade(options);
+  const made = new (g.map3d as unknown as { shade: new (options: object) => { addTo(map: unknown): never; remove(): void } }).shade(
+    options,
+  );
   return (g.shade = made.addTo(g.map));
 };
 
@@ -38,7 +40,10 @@ async function start(options: object, rendering = "town", context: object = VIEW
 
 /** U and V of a CSS pixel's centre. */
 async function gridOf(page: Page): Promise<(x: number, y: number) => [number, number]> {
-  const [corner, px] = await page.evaluate((origin) => [(globalThis as Global).map.project(origin), (globalThis as Global).map.metresPerPixel] as const, ORIGIN);
+  const [corner, px] = await page.evaluate(
+    (origin) => [(globalThis as Global).map.project(origin), (globalThis as Global).map.metresPerPixel] as const,
+    ORIGIN,
+  );
   const [x0, y0] = corner as [number, number];
   return (x, y) => [(x + 0.5 - x0) * px, (y0 - y - 0.5) * px];
 }
@@ -65,14 +70,21 @@ test("estimated shadows match rays to the sun for all visible points", async () 
   const counts = { lit: 0, falsely: 0, shadow: 0, missed: 0 };
   for (let y = 6; y < HEIGHT - 6; y += 2) {
     for (let x = 6; x < WIDTH - 6; x += 2) {
-      const seen = [[0, 0], [-3, 0], [3, 0], [0, -3], [0, 3]].map(([dx = 0, dy = 0]) => {
+      const seen = [
+        [0, 0],
+        [-3, 0],
+        [3, 0],
+        [0, -3],
+        [0, 3],
+      ].map(([dx = 0, dy = 0]) => {
         const uv = uvOf(x + dx, y + dy);
         const hit = trace(frame, ...uv);
         return hit && { name: `${String(hit.id)} ${String(hit.normal)}`, normal: hit.normal, open: seesSun(pointOf(hit, uv)) };
       });
       const [here] = seen;
       // At an edge, or the edge of a shadow, a pixel may be either.
-      if (!here || dot(here.normal, towardsLight(SUN)) < 0.1 || seen.some((other) => other?.name !== here.name || other.open !== here.open)) continue;
+      if (!here || dot(here.normal, towardsLight(SUN)) < 0.1 || seen.some((other) => other?.name !== here.name || other.open !== here.open))
+        continue;
       const dimmed = (dim[4 * (WIDTH * y + x)] ?? 0) < 0.75 * (bright[4 * (WIDTH * y + x)] ?? 0);
       counts[here.open ? (dimmed ? "falsely" : "lit") : dimmed ? "shadow" : "missed"]++;
     }
@@ -91,12 +103,22 @@ test("occlusion darkens the ground at the foot of a wall, fades with distance, a
   await page.screenshot({ path: `${OUT}/shade-sky.png` });
   const dim = await picture(page);
   const shareAt = async (local: Vec3): Promise<number> => {
-    const [x, y] = (await page.evaluate((world) => (globalThis as Global).map.project(world as [number, number, number]), local.map((value, k) => value + (ORIGIN[k] ?? 0)))) as [number, number];
+    const [x, y] = (await page.evaluate(
+      (world) => (globalThis as Global).map.project(world as [number, number, number]),
+      local.map((value, k) => value + (ORIGIN[k] ?? 0)),
+    )) as [number, number];
     const at = 4 * (WIDTH * Math.round(y) + Math.round(x));
     return (dim[at] ?? 0) / (bright[at] ?? 1);
   };
   // The town hall's front wall is at y = −22.
-  const [foot, near, open, roof] = await Promise.all([[-45, -23.5, 0], [-45, -32, 0], [-45, -60, 0], [-45, -4, 34]].map((point) => shareAt(point as unknown as Vec3)));
+  const [foot, near, open, roof] = await Promise.all(
+    [
+      [-45, -23.5, 0],
+      [-45, -32, 0],
+      [-45, -60, 0],
+      [-45, -4, 34],
+    ].map((point) => shareAt(point as unknown as Vec3)),
+  );
   expect(foot).toBeLessThan(0.88);
   expect(near).toBeGreaterThan((foot ?? 1) + 0.03);
   expect(open).toBeGreaterThan(0.98);
@@ -116,11 +138,18 @@ test("after a movement the picture equals that of a map opened there and rests; 
   await page.mouse.up();
   await drawn(page);
   expect(Buffer.compare(await picture(page), before)).toBe(0);
-  const frames = await page.evaluate(() => new Promise<number>((done) => {
-    let drawn = 0;
-    (globalThis as Global).map.frameEvents.on("draw", () => { drawn++; });
-    setTimeout(() => { done(drawn); }, 1000);
-  }));
+  const frames = await page.evaluate(
+    () =>
+      new Promise<number>((done) => {
+        let drawn = 0;
+        (globalThis as Global).map.frameEvents.on("draw", () => {
+          drawn++;
+        });
+        setTimeout(() => {
+          done(drawn);
+        }, 1000);
+      }),
+  );
   expect(frames).toBe(0);
   await settled(page, () => (globalThis as Global & { shade: { remove(): void } }).shade.remove(), null);
   expect(Buffer.compare(await picture(page), bare)).toBe(0);
@@ -134,20 +163,32 @@ test("an exported picture of several pieces has the shadows of the screen, at it
   await settled(page, addShade, {});
   const screen = await picture(page);
   /** The exported picture, averaged to the pixels of the screen. */
-  const exported = (scale: number): Promise<number[]> => page.evaluate(async (scale) => {
-    const g = globalThis as unknown as Global & { map3d: typeof Print };
-    const bitmap = await createImageBitmap(await g.map3d.exportPicture(g.map, { scale, scaleBar: false, northArrow: false, attribution: "", background: "transparent", markers: false }), { premultiplyAlpha: "none" });
-    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d") as OffscreenCanvasRenderingContext2D;
-    context.drawImage(bitmap, 0, 0);
-    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
-    const [columns, rows] = [bitmap.width / scale, bitmap.height / scale];
-    return Array.from({ length: columns * rows * 4 }, (_, k) => {
-      const [x, y] = [((k >> 2) % columns) * scale, Math.floor((k >> 2) / columns) * scale];
-      let sum = 0;
-      for (let j = 0; j < scale * scale; j++) sum += data[4 * ((y + Math.floor(j / scale)) * bitmap.width + x + (j % scale)) + (k & 3)] ?? 0;
-      return sum / scale ** 2;
-    });
-  }, scale);
+  const exported = (scale: number): Promise<number[]> =>
+    page.evaluate(async (scale) => {
+      const g = globalThis as unknown as Global & { map3d: typeof Print };
+      const bitmap = await createImageBitmap(
+        await g.map3d.exportPicture(g.map, {
+          scale,
+          scaleBar: false,
+          northArrow: false,
+          attribution: "",
+          background: "transparent",
+          markers: false,
+        }),
+        { premultiplyAlpha: "none" },
+      );
+      const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d") as OffscreenCanvasRenderingContext2D;
+      context.drawImage(bitmap, 0, 0);
+      const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+      const [columns, rows] = [bitmap.width / scale, bitmap.height / scale];
+      return Array.from({ length: columns * rows * 4 }, (_, k) => {
+        const [x, y] = [((k >> 2) % columns) * scale, Math.floor((k >> 2) / columns) * scale];
+        let sum = 0;
+        for (let j = 0; j < scale * scale; j++)
+          sum += data[4 * ((y + Math.floor(j / scale)) * bitmap.width + x + (j % scale)) + (k & 3)] ?? 0;
+        return sum / scale ** 2;
+      });
+    }, scale);
   const difference = (a: ArrayLike<number>, b: ArrayLike<number>): { mean: number; most: number } => {
     let [sum, count, most] = [0, 0, 0];
     for (let k = 0; k < screen.length; k += 4) {
@@ -161,7 +202,11 @@ test("an exported picture of several pieces has the shadows of the screen, at it
   expect(shaded.mean).toBeGreaterThan(5);
   expect(difference(await exported(1), screen).most).toBeLessThanOrEqual(1);
   const double = difference(await exported(2), screen);
-  console.log("shadows on the screen, and its difference from a picture of twice the resolution:", shaded.mean.toFixed(2), double.mean.toFixed(2));
+  console.log(
+    "shadows on the screen, and its difference from a picture of twice the resolution:",
+    shaded.mean.toFixed(2),
+    double.mean.toFixed(2),
+  );
   expect(double.mean).toBeLessThan(0.25 * shaded.mean);
   // Without shadows from depth, there are none in the picture.
   await settled(page, () => (globalThis as Global & { shade: { remove(): void } }).shade.remove(), null);

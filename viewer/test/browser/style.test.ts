@@ -27,7 +27,11 @@ const expected: Record<number, (color: Bytes) => Bytes> = {
   [CHAPEL]: (color) => [0, 1, 2].map(() => 0.35 * grey(color) + 0.65 * 0.86 * 255),
 };
 const style = ([hall, school, tower]: readonly number[]): unknown =>
-  (globalThis as Global).layer.setStyle({ colors: new Map([[hall as number, "#1389a0"]]), only: [hall as number, school as number], hidden: [tower as number] });
+  (globalThis as Global).layer.setStyle({
+    colors: new Map([[hall as number, "#1389a0"]]),
+    only: [hall as number, school as number],
+    hidden: [tower as number],
+  });
 
 test.each(["webgl", "canvas"])("%s: every pixel has the style of its object, and a reset restores all", async (drawer) => {
   const { page, problems } = await bed.start("town", { zoom: 3, drawer, light: { lit: false } }, {}, VIEWPORT);
@@ -76,10 +80,11 @@ test("both drawers show the same when lit", async () => {
 test("hidden objects are neither picked nor listed as visible", async () => {
   const { page } = await undrawn.start("town", { zoom: 3 });
   const top = [ORIGIN[0] + 32, ORIGIN[1] + 26, ORIGIN[2] + 62] as const;
-  const idAt = (): Promise<number> => page.evaluate(async (world) => {
-    const { map } = globalThis as Global;
-    return (await map.pick(map.project(world) as [number, number])).id;
-  }, top);
+  const idAt = (): Promise<number> =>
+    page.evaluate(async (world) => {
+      const { map } = globalThis as Global;
+      return (await map.pick(map.project(world) as [number, number])).id;
+    }, top);
   const seen = (): Promise<number[]> => page.evaluate(async () => (await (globalThis as Global).map.objectsInView()).map(({ id }) => id));
   expect(await idAt()).toBe(TOWER);
   expect(await seen()).toContain(TOWER);
@@ -94,34 +99,64 @@ test("attributes are read by column", async () => {
     const { layer } = globalThis as Global;
     const all = await layer.attributes();
     const height = all.find(({ name }) => name === "measuredHeight");
-    return { names: all.map(({ of, name }) => `${of}.${name}`), height, values: height ? [...await layer.column(height)] : [], none: (await layer.column({ column: "../../rendering" })).size };
+    return {
+      names: all.map(({ of, name }) => `${of}.${name}`),
+      height,
+      values: height ? [...(await layer.column(height))] : [],
+      none: (await layer.column({ column: "../../rendering" })).size,
+    };
   });
   expect(found.names).toEqual(["object.class", "attributes.listed", "attributes.measuredHeight", "attributes.note", "attributes.roofType"]);
   expect(found.height).toMatchObject({ type: "number", min: 2, max: 62, objects: 5 });
-  expect(found.values).toEqual([[GROUND, 2], [HALL, 34], [SCHOOL, 16], [TOWER, 62], [CHAPEL, 20]]);
+  expect(found.values).toEqual([
+    [GROUND, 2],
+    [HALL, 34],
+    [SCHOOL, 16],
+    [TOWER, 62],
+    [CHAPEL, 20],
+  ]);
   expect(found.none).toBe(0);
 });
 
 test("a theme of a divided column reads the values of objects in view, hidden ones included", async () => {
   const { page, problems } = await undrawn.start("divided", { zoom: 3 }, {}, VIEWPORT);
   const asked: string[] = [];
-  page.on("request", (request) => { if (request.url().includes(HEIGHTS)) asked.push(request.url().replace(/^.*columns\//, "")); });
+  page.on("request", (request) => {
+    if (request.url().includes(HEIGHTS)) asked.push(request.url().replace(/^.*columns\//, ""));
+  });
   await page.addScriptTag({ url: "/map3d-theme.js" });
-  const idsOf = (): Promise<(readonly number[])[]> => page.evaluate(() => (globalThis as unknown as Theming).theme.classes.map(({ ids }) => ids));
-  const near = await page.evaluate(async (tower) => {
-    const g = globalThis as unknown as Theming;
-    await new Promise<void>((done) => { g.map.once("idle", () => { done(); }).setView(tower, 8); });
-    const seen = (await g.map.objectsInView()).map(({ id }) => id);
-    g.theme = new g.map3d.theme(g.layer, "measuredHeight", { language: "en", others: "hidden" }).addTo(g.map);
-    await new Promise<void>((done) => { g.theme.once("ready", () => { done(); }); });
-    return seen;
-  }, [ORIGIN[0] + 32, ORIGIN[1] + 26, ORIGIN[2] + 62] as const);
-  const shardsOf = (ids: readonly number[]): string[] => [...new Set(ids.map((id) => `${HEIGHTS}/${String(Math.floor(id / 1024))}.json`))].sort();
+  const idsOf = (): Promise<(readonly number[])[]> =>
+    page.evaluate(() => (globalThis as unknown as Theming).theme.classes.map(({ ids }) => ids));
+  const near = await page.evaluate(
+    async (tower) => {
+      const g = globalThis as unknown as Theming;
+      await new Promise<void>((done) => {
+        g.map
+          .once("idle", () => {
+            done();
+          })
+          .setView(tower, 8);
+      });
+      const seen = (await g.map.objectsInView()).map(({ id }) => id);
+      g.theme = new g.map3d.theme(g.layer, "measuredHeight", { language: "en", others: "hidden" }).addTo(g.map);
+      await new Promise<void>((done) => {
+        g.theme.once("ready", () => {
+          done();
+        });
+      });
+      return seen;
+    },
+    [ORIGIN[0] + 32, ORIGIN[1] + 26, ORIGIN[2] + 62] as const,
+  );
+  const shardsOf = (ids: readonly number[]): string[] =>
+    [...new Set(ids.map((id) => `${HEIGHTS}/${String(Math.floor(id / 1024))}.json`))].sort();
   expect(near.length).toBeLessThan(5);
   expect(asked[0]).toBe(`${HEIGHTS}.json`);
   expect(asked.slice(1).sort()).toEqual(shardsOf(near));
   expect(await page.locator(".map3d-legend button").count()).toBe(5);
-  await page.evaluate((center) => { (globalThis as Global).map.setView([...center], 3); }, ORIGIN);
+  await page.evaluate((center) => {
+    (globalThis as Global).map.setView([...center], 3);
+  }, ORIGIN);
   await expect.poll(idsOf, { timeout: 20_000 }).toEqual([[GROUND], [SCHOOL], [CHAPEL], [HALL], [TOWER]]);
   expect(asked.length).toBe(new Set(asked).size);
   expect(problems).toEqual([]);
@@ -131,28 +166,52 @@ test("a theme colours objects, filters by its legend, and restores all; an unkno
   const { page, problems } = await bed.start("town", { zoom: 3 }, {}, VIEWPORT);
   const before = await picture(page);
   await page.addScriptTag({ url: "/map3d-theme.js" });
-  await page.evaluate(() => new Promise<void>((done) => {
-    const g = globalThis as unknown as Theming;
-    g.theme = new g.map3d.theme(g.layer, "measuredHeight", { language: "de", others: "hidden" }).addTo(g.map);
-    g.theme.once("ready", () => { g.map.once("idle", () => { done(); }); });
-  }));
+  await page.evaluate(
+    () =>
+      new Promise<void>((done) => {
+        const g = globalThis as unknown as Theming;
+        g.theme = new g.map3d.theme(g.layer, "measuredHeight", { language: "de", others: "hidden" }).addTo(g.map);
+        g.theme.once("ready", () => {
+          g.map.once("idle", () => {
+            done();
+          });
+        });
+      }),
+  );
   expect(await page.locator(".map3d-legend").count()).toBe(1);
   const painted = await picture(page);
   expect(painted.equals(before)).toBe(false);
   await page.screenshot({ path: `${OUT}/theme.png` });
-  expect(await page.evaluate(() => (globalThis as unknown as Theming).theme.classes.map(({ ids }) => ids))).toEqual([[GROUND], [SCHOOL], [CHAPEL], [HALL], [TOWER]]);
+  expect(await page.evaluate(() => (globalThis as unknown as Theming).theme.classes.map(({ ids }) => ids))).toEqual([
+    [GROUND],
+    [SCHOOL],
+    [CHAPEL],
+    [HALL],
+    [TOWER],
+  ]);
   await page.locator(".map3d-legend button").nth(3).click();
   await page.waitForFunction(async () => (await (globalThis as Global).map.objectsInView()).length === 1);
   await page.locator(".map3d-legend button").nth(3).click();
   await page.waitForFunction(async () => (await (globalThis as Global).map.objectsInView()).length === 5);
-  await settled(page, () => { (globalThis as unknown as Theming).theme.remove(); }, null);
+  await settled(
+    page,
+    () => {
+      (globalThis as unknown as Theming).theme.remove();
+    },
+    null,
+  );
   expect(before.equals(await picture(page))).toBe(true);
   expect(await page.locator(".map3d-legend").count()).toBe(0);
-  const failed = await page.evaluate(() => new Promise<string>((done) => {
-    const g = globalThis as unknown as Theming;
-    g.map.on("error", ({ error }) => { done(error.message); });
-    new g.map3d.theme(g.layer, "height").addTo(g.map);
-  }));
+  const failed = await page.evaluate(
+    () =>
+      new Promise<string>((done) => {
+        const g = globalThis as unknown as Theming;
+        g.map.on("error", ({ error }) => {
+          done(error.message);
+        });
+        new g.map3d.theme(g.layer, "height").addTo(g.map);
+      }),
+  );
   expect(failed).toBe('no attribute "height"; the rendering has class, listed, measuredHeight, note, roofType');
   expect(problems).toEqual([]);
 });
@@ -167,9 +226,27 @@ function divideColumn(files: Map<string, Uint8Array>, name: string): string {
   const shards = [...new Set(whole.ids.map((id) => Math.floor(id / 1024)))];
   for (const shard of shards) {
     const rows = whole.ids.flatMap((id, k) => (Math.floor(id / 1024) === shard ? [[id, whole.values[k] as number] as const] : []));
-    write(`objects/columns/${column}/${String(shard)}.json`, { map3d: "column", version: 1, name, of: "attributes", shard, ids: rows.map(([id]) => id), values: rows.map(([, value]) => value) });
+    write(`objects/columns/${column}/${String(shard)}.json`, {
+      map3d: "column",
+      version: 1,
+      name,
+      of: "attributes",
+      shard,
+      ids: rows.map(([id]) => id),
+      values: rows.map(([, value]) => value),
+    });
   }
   const numbers = [...whole.values].sort((a, b) => a - b);
-  write(`objects/columns/${column}.json`, { map3d: "column", version: 2, name, of: "attributes", shard_size: 1024, shards, objects: numbers.length, values: numbers.map((value) => [value, 1]), numbers });
+  write(`objects/columns/${column}.json`, {
+    map3d: "column",
+    version: 2,
+    name,
+    of: "attributes",
+    shard_size: 1024,
+    shards,
+    objects: numbers.length,
+    values: numbers.map((value) => [value, 1]),
+    numbers,
+  });
   return column;
 }

@@ -19,12 +19,30 @@ import { decoded } from "./page";
 // Common tasks with a city model on a phone: each takes at most three actions after opening. MAP3D_CLOCK=1 takes a dense screen, slows the phone down and prints times.
 const CLOCK = process.env.MAP3D_CLOCK === "1";
 const [WIDTH, HEIGHT, DENSITY, PIXEL_M] = [390, 844, CLOCK ? 3 : 1, 0.38];
-const PHONE = { viewport: { width: WIDTH, height: HEIGHT }, deviceScaleFactor: DENSITY, isMobile: true, hasTouch: true, userAgent: devices["iPhone 14"].userAgent, timezoneId: "Europe/Berlin", locale: "en-GB" };
-const YEARS = new Map([[17, 1891], [1025, 1956], [2_000_000_001, 2012], [3_900_000_007, 1723]]);
+const PHONE = {
+  viewport: { width: WIDTH, height: HEIGHT },
+  deviceScaleFactor: DENSITY,
+  isMobile: true,
+  hasTouch: true,
+  userAgent: devices["iPhone 14"].userAgent,
+  timezoneId: "Europe/Berlin",
+  locale: "en-GB",
+};
+const YEARS = new Map([
+  [17, 1891],
+  [1025, 1956],
+  [2_000_000_001, 2012],
+  [3_900_000_007, 1723],
+]);
 
 const drawn = new TestBed({ town: withYears(renderTown(256, PIXEL_M)), later: renderLater(256, PIXEL_M) });
 const bed = new TestBed(drawn.server, { draws: CLOCK });
-const views = framesOf(BOX, 256, PIXEL_M, [0, 90, 180, 270].map((a) => [a, 45] as const)).frames;
+const views = framesOf(
+  BOX,
+  256,
+  PIXEL_M,
+  [0, 90, 180, 270].map((a) => [a, 45] as const),
+).frames;
 
 /** The same rendering, with a year for each object. */
 function withYears(fixture: Fixture): Fixture {
@@ -33,7 +51,10 @@ function withYears(fixture: Fixture): Fixture {
   const [name, column] = ["yearOfConstruction", "0123456789abcdef"];
   list.attributes.push({ name, of: "attributes", column, type: "number", objects: YEARS.size, variety: YEARS.size, min: 1723, max: 2012 });
   fixture.files.set("objects/attributes.json", text(list));
-  fixture.files.set(`objects/columns/${column}.json`, text({ map3d: "column", version: 1, name, of: "attributes", ids: [...YEARS.keys()], values: [...YEARS.values()] }));
+  fixture.files.set(
+    `objects/columns/${column}.json`,
+    text({ map3d: "column", version: 1, name, of: "attributes", ids: [...YEARS.keys()], values: [...YEARS.values()] }),
+  );
   return fixture;
 }
 
@@ -49,7 +70,11 @@ interface Opened {
 async function open(query = "", from = bed): Promise<Opened> {
   const { page, problems } = await from.openPage(PHONE, { maps: true });
   await page.context().grantPermissions(["clipboard-read", "clipboard-write"]);
-  await page.addInitScript(() => { window.print = () => { document.title = "printed"; }; });
+  await page.addInitScript(() => {
+    window.print = () => {
+      document.title = "printed";
+    };
+  });
   if (CLOCK) await throttle(page);
   const begun = performance.now();
   await page.goto(`${bed.server.origin}/?rendering=${bed.url("town")}${query}`);
@@ -61,7 +86,10 @@ async function open(query = "", from = bed): Promise<Opened> {
 
 async function end({ page, actions, problems, opened }: Opened, name: string): Promise<void> {
   const seconds = (ms: number): string => `${(ms / 1000).toFixed(1)} s`;
-  if (CLOCK && actions.begun !== undefined) console.info(`${name}: opened in ${seconds(opened)}, ${String(actions.count)} actions in ${seconds(performance.now() - actions.begun)}`);
+  if (CLOCK && actions.begun !== undefined)
+    console.info(
+      `${name}: opened in ${seconds(opened)}, ${String(actions.count)} actions in ${seconds(performance.now() - actions.begun)}`,
+    );
   await page.screenshot({ path: `${OUT}/task-${name}.png` });
   expect(problems).toEqual([]);
   await page.context().close();
@@ -94,10 +122,15 @@ test("find an address", async () => {
   expect(await page.locator("#info h2").textContent()).toBe("Chapel");
   // In the middle of what the card leaves free.
   const card = await page.locator("#info").boundingBox();
-  await expect.poll(() => {
-    const [x, y] = placeOf(page, [-28, 47, 20]);
-    return Math.hypot(x - WIDTH / 2, y - (card?.y ?? NaN) / 2);
-  }, { timeout: 20_000 }).toBeLessThan(3);
+  await expect
+    .poll(
+      () => {
+        const [x, y] = placeOf(page, [-28, 47, 20]);
+        return Math.hypot(x - WIDTH / 2, y - (card?.y ?? NaN) / 2);
+      },
+      { timeout: 20_000 },
+    )
+    .toBeLessThan(3);
   expect(new URL(page.url()).hash).toContain("/id=3900000007");
   await end(opened, "address");
 });
@@ -190,7 +223,9 @@ test("compare two epochs", async () => {
   await page.waitForSelector("#info:not([hidden])");
   expect(await page.locator("#info h2").textContent()).toBe("New school");
   await actions.tap(placeOf(page, [32, 26, 62]));
-  await page.waitForFunction(() => document.querySelector("#info h2")?.textContent !== "New school" || document.querySelector("#info[hidden]"));
+  await page.waitForFunction(
+    () => document.querySelector("#info h2")?.textContent !== "New school" || document.querySelector("#info[hidden]"),
+  );
   expect(await page.locator("#info h2").textContent()).not.toBe("Tower");
   // The link shows the same epoch.
   const { page: other } = await bed.openPage(PHONE);
@@ -207,14 +242,21 @@ test("compare four directions", async () => {
   const { zoom } = cameraOf(page);
   const windows = (): Promise<number> => page.locator(".map3d").count();
   await actions.tap("#compare");
-  await expect.poll(() => page.locator(".map3d-facing").allTextContents(), { timeout: 20_000 }).toEqual(["Facing north", "Facing east", "Facing south", "Facing west"]);
+  await expect
+    .poll(() => page.locator(".map3d-facing").allTextContents(), { timeout: 20_000 })
+    .toEqual(["Facing north", "Facing east", "Facing south", "Facing west"]);
   await resting(page);
   await page.screenshot({ path: `${OUT}/task-four.png` });
   expect(await windows()).toBe(4);
   // The four quarters differ, and nothing covers their captions.
   for (const caption of await page.locator(".map3d-facing").all()) {
     const { x, y, width, height } = (await caption.boundingBox()) as { x: number; y: number; width: number; height: number };
-    expect(await page.evaluate(([cx, cy]) => document.elementsFromPoint(cx, cy).some((node) => node.matches(".card, .end-compare")), [x + width / 2, y + height / 2] as const)).toBe(false);
+    expect(
+      await page.evaluate(([cx, cy]) => document.elementsFromPoint(cx, cy).some((node) => node.matches(".card, .end-compare")), [
+        x + width / 2,
+        y + height / 2,
+      ] as const),
+    ).toBe(false);
   }
   // A tap in one of the maps selects; the others highlight the same object.
   await actions.tap([WIDTH * 0.75, HEIGHT * 0.27]);
@@ -241,7 +283,13 @@ test("read an attribute", async () => {
   const { page, actions } = opened;
   await actions.tap(placeOf(page, [-45, -4, 34]));
   await page.waitForSelector("#info:not([hidden])");
-  const rows = (number: number): Promise<Record<string, string | null | undefined>> => page.locator("#info dl").nth(number).evaluate((list) => Object.fromEntries([...list.querySelectorAll("dt")].map((name) => [name.textContent, name.nextElementSibling?.textContent])));
+  const rows = (number: number): Promise<Record<string, string | null | undefined>> =>
+    page
+      .locator("#info dl")
+      .nth(number)
+      .evaluate((list) =>
+        Object.fromEntries([...list.querySelectorAll("dt")].map((name) => [name.textContent, name.nextElementSibling?.textContent])),
+      );
   expect(await rows(0)).toMatchObject({ Height: "34 m" });
   await actions.tap("#info summary");
   expect(await rows(1)).toMatchObject({ measuredHeight: "34", roofType: "3100", listed: "Yes" });
@@ -257,14 +305,22 @@ test("colour by year", async () => {
   await actions.choose("#color-by", "yearOfConstruction");
   await page.waitForSelector("#legend button");
   await resting(page);
-  const classes = await page.locator("#legend button").evaluateAll((buttons) => buttons.map((button) => {
-    const swatch = [...button.querySelectorAll("*"), button].map((part) => getComputedStyle(part).backgroundColor).find((color) => color !== "rgba(0, 0, 0, 0)") ?? "";
-    return { label: button.textContent, rgb: (swatch.match(/\d+/g) ?? []).slice(0, 3).map(Number) };
-  }));
+  const classes = await page.locator("#legend button").evaluateAll((buttons) =>
+    buttons.map((button) => {
+      const swatch =
+        [...button.querySelectorAll("*"), button]
+          .map((part) => getComputedStyle(part).backgroundColor)
+          .find((color) => color !== "rgba(0, 0, 0, 0)") ?? "";
+      return { label: button.textContent, rgb: (swatch.match(/\d+/g) ?? []).slice(0, 3).map(Number) };
+    }),
+  );
   expect(classes.map(({ label }) => label)).toEqual([...YEARS.values()].sort((a, b) => a - b).map(String));
   const shot = await decoded(await page.screenshot({ path: `${OUT}/task-colors.png` }));
   // Each roof has the colour of its year, apart from lighting.
-  for (const { id, box: [lo, hi] } of THINGS.slice(1)) {
+  for (const {
+    id,
+    box: [lo, hi],
+  } of THINGS.slice(1)) {
     const seen = pixel(shot, placeOf(page, [(lo[0] + hi[0]) / 2, (lo[1] + hi[1]) / 2, hi[2]]));
     const like = (rgb: readonly number[]): number => Math.hypot(...unit(rgb).map((part, k) => part - (unit(seen)[k] ?? 0)));
     const nearest = [...classes].sort((a, b) => like(a.rgb) - like(b.rgb))[0];
@@ -282,7 +338,9 @@ test("see the shadow at 17:00", async () => {
   expect(await page.locator("#clock").textContent()).toBe("12:00");
   const { x, y, width, height } = (await slider.boundingBox()) as { x: number; y: number; width: number; height: number };
   const THUMB_PX = 22;
-  const [dawn, dusk] = await slider.evaluate((input) => [Number((input as HTMLInputElement).min), Number((input as HTMLInputElement).max)] as const);
+  const [dawn, dusk] = await slider.evaluate(
+    (input) => [Number((input as HTMLInputElement).min), Number((input as HTMLInputElement).max)] as const,
+  );
   const at = (hour: number): Vec2 => [x + THUMB_PX / 2 + ((width - THUMB_PX) * (hour - dawn)) / (dusk - dawn), y + height / 2];
   await actions.drag(at(12), at(17));
   expect(await page.locator("#clock").textContent()).toBe("17:00");
@@ -294,21 +352,38 @@ test("see the shadow at 17:00", async () => {
     const [u, v, d] = uvdFromLocal(cameraOf(page).frame.axes, ground);
     const hit = trace(cameraOf(page).frame, u, v);
     // Visible ground, away from edges and paths.
-    if (hit?.id !== 3 || Math.abs(cameraOf(page).frame.d0 + hit.d - d) > 0.01 || Math.abs(ground[0] + 8) < 6 || Math.abs(ground[1] - 26) < 5) continue;
-    const around = [[0, 0], [2, 0], [-2, 0], [0, 2], [0, -2]].map(([dx = 0, dy = 0]) => shaded([ground[0] + dx, ground[1] + dy, 0], light));
+    if (
+      hit?.id !== 3 ||
+      Math.abs(cameraOf(page).frame.d0 + hit.d - d) > 0.01 ||
+      Math.abs(ground[0] + 8) < 6 ||
+      Math.abs(ground[1] - 26) < 5
+    )
+      continue;
+    const around = [
+      [0, 0],
+      [2, 0],
+      [-2, 0],
+      [0, 2],
+      [0, -2],
+    ].map(([dx = 0, dy = 0]) => shaded([ground[0] + dx, ground[1] + dy, 0], light));
     const [px, py] = placeOf(page, ground);
     if (around.some((dark) => dark !== around[0]) || px < 5 || px > 300 || py < 200 || py > 640) continue;
     (around[0] ? places.dark : places.lit).push([px, py]);
   }
   expect(places.dark.length).toBeGreaterThan(20);
   expect(places.lit.length).toBeGreaterThan(200);
-  // The fraction of positions in shadow according to rays that is darker than sunlit ground.
-  await expect.poll(async () => {
-    const shot = await decoded(await page.screenshot());
-    const values = (of: readonly Vec2[]): number[] => of.map((place) => pixel(shot, place).reduce((sum, part) => sum + part, 0));
-    const bright = values(places.lit).sort((a, b) => a - b)[Math.floor(places.lit.length / 2)] ?? 0;
-    return values(places.dark).filter((value) => value < 0.85 * bright).length / places.dark.length;
-  }, { timeout: 20_000, interval: 500 }).toBeGreaterThan(0.8);
+  // Of the positions in shadow according to rays, the fraction that is darker than sunlit ground.
+  await expect
+    .poll(
+      async () => {
+        const shot = await decoded(await page.screenshot());
+        const values = (of: readonly Vec2[]): number[] => of.map((place) => pixel(shot, place).reduce((sum, part) => sum + part, 0));
+        const bright = values(places.lit).sort((a, b) => a - b)[Math.floor(places.lit.length / 2)] ?? 0;
+        return values(places.dark).filter((value) => value < 0.85 * bright).length / places.dark.length;
+      },
+      { timeout: 20_000, interval: 500 },
+    )
+    .toBeGreaterThan(0.8);
   await end(opened, "shadow");
 });
 
@@ -319,7 +394,9 @@ test("print, and save a picture", async () => {
   await page.screenshot({ path: `${OUT}/task-picture.png` });
   await actions.tap("#picture-print");
   await page.waitForFunction(() => document.title === "printed");
-  const [width, height] = await page.locator("#sheet img").evaluate((image) => [(image as HTMLImageElement).naturalWidth, (image as HTMLImageElement).naturalHeight]);
+  const [width, height] = await page
+    .locator("#sheet img")
+    .evaluate((image) => [(image as HTMLImageElement).naturalWidth, (image as HTMLImageElement).naturalHeight]);
   expect([width, height]).toEqual([WIDTH, HEIGHT]);
   expect(await page.locator("#sheet h1").textContent()).toBe("A small town");
   await end(opened, "print");

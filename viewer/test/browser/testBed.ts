@@ -14,7 +14,9 @@ export function serve(renderings: Renderings): TestServer {
   for (const [name, rendering] of Object.entries(renderings)) server.renderings.set(name, rendering);
   server.pages.set("/bare", BARE);
   server.pages.set("/bare.css", "html,body{margin:0;height:100%}#mapcanvas{width:100%;height:100vh}");
-  beforeAll(async () => { await server.listen(); });
+  beforeAll(async () => {
+    await server.listen();
+  });
   afterAll(() => server.close());
   return server;
 }

@@ -43,11 +43,17 @@ test("README's example runs unchanged; markers are at their 3D positions", async
     hall.addTo(map);
     const chapel = new map3d.marker("Chapel", [691000 - 28, 5336000 + 47, 520]).bindPopup("A <b>chapel</b>").addTo(map);
     await new Promise((done) => map.once("idle", done));
-    const button = [...document.querySelectorAll<HTMLElement>(".map3d-marker")].find((found) => found.getAttribute("aria-label") === "Town hall") as HTMLElement;
+    const button = [...document.querySelectorAll<HTMLElement>(".map3d-marker")].find(
+      (found) => found.getAttribute("aria-label") === "Town hall",
+    ) as HTMLElement;
     const box = button.getBoundingClientRect();
     const at = map.project(hall.position as [number, number, number]) as [number, number];
     chapel.select().openPopup();
-    return { dx: box.x + box.width / 2 - at[0], dy: box.y + box.height / 2 - at[1], popup: document.querySelector(".map3d-popup-body")?.textContent };
+    return {
+      dx: box.x + box.width / 2 - at[0],
+      dy: box.y + box.height / 2 - at[1],
+      popup: document.querySelector(".map3d-popup-body")?.textContent,
+    };
   }, bed.url("town"));
   await page.screenshot({ path: `${OUT}/listing.png` });
   expect(Math.abs(found.dx)).toBeLessThan(0.1);
@@ -62,7 +68,15 @@ test("a click on a known object gives its id, its name and a position within a p
   const at = await page.evaluate((world) => (globalThis as Global).map.project(world) as [number, number], roof);
   await page.mouse.click(at[0], at[1]);
   await page.waitForFunction(() => (globalThis as Global).clicks.length > 0);
-  const [click] = await page.evaluate(() => (globalThis as Global).clicks.map(({ id, position, approximate, name, attributes }) => ({ id, position, approximate, name, attributes })));
+  const [click] = await page.evaluate(() =>
+    (globalThis as Global).clicks.map(({ id, position, approximate, name, attributes }) => ({
+      id,
+      position,
+      approximate,
+      name,
+      attributes,
+    })),
+  );
   expect(click).toMatchObject({ id: 17, approximate: false, name: "Town hall", attributes: { measuredHeight: 34 } });
   const pixel_m = 0.38;
   expect(Math.hypot(...roof.map((part, k) => part - (click?.position?.[k] ?? 0)))).toBeLessThan(2 * pixel_m);
@@ -113,7 +127,8 @@ test("each pixel is lit by Lambert's law in linear light, half by its own normal
     const [sky, sun] = spread(shares(n) ?? [1, 0.5], [normal(x - 1, y), normal(x + 1, y), normal(x, y - 1), normal(x, y + 1)].map(shares));
     const strength = light.ambient * sky + light.diffuse * sun;
     const want = [0, 1, 2].map((k) => litByte(c[k] ?? 0, strength));
-    if (want.some((value, k) => Math.abs(value - (got[4 * at + k] ?? 0)) > 1)) wrong.push(`${String(x)}, ${String(y)}: ${String(want)} is ${String([...got.subarray(4 * at, 4 * at + 3)])}`);
+    if (want.some((value, k) => Math.abs(value - (got[4 * at + k] ?? 0)) > 1))
+      wrong.push(`${String(x)}, ${String(y)}: ${String(want)} is ${String([...got.subarray(4 * at, 4 * at + 3)])}`);
   }
   expect(wrong.slice(0, 5)).toEqual([]);
   expect(compared).toBeGreaterThan(50_000);
@@ -132,7 +147,8 @@ test("a highlight changes exactly the pixels of its ids", async () => {
   for (let at = 0; at < 800 * 600; at++) {
     const id = ids((at % 800) - left, Math.floor(at / 800) - top)?.readUInt32LE() ?? 0;
     const differs = !before.subarray(4 * at, 4 * at + 4).equals(after.subarray(4 * at, 4 * at + 4));
-    if (differs !== (id === 1025 || id === 3_900_000_007)) wrong.push(`${String(at % 800)}, ${String(Math.floor(at / 800))} of object ${String(id)}`);
+    if (differs !== (id === 1025 || id === 3_900_000_007))
+      wrong.push(`${String(at % 800)}, ${String(Math.floor(at / 800))} of object ${String(id)}`);
     if (differs) changed++;
   }
   expect(wrong.slice(0, 10)).toEqual([]);
@@ -178,15 +194,20 @@ test("idle means no requests and no frames", async () => {
   const { page } = await recorded();
   await page.waitForTimeout(300);
   const asked = bed.server.requests.length;
-  const frames = await page.evaluate(() => new Promise<number>((done) => {
-    let count = 0;
-    const request = globalThis.requestAnimationFrame.bind(globalThis);
-    globalThis.requestAnimationFrame = (call) => {
-      count++;
-      return request(call);
-    };
-    setTimeout(() => { done(count); }, 1000);
-  }));
+  const frames = await page.evaluate(
+    () =>
+      new Promise<number>((done) => {
+        let count = 0;
+        const request = globalThis.requestAnimationFrame.bind(globalThis);
+        globalThis.requestAnimationFrame = (call) => {
+          count++;
+          return request(call);
+        };
+        setTimeout(() => {
+          done(count);
+        }, 1000);
+      }),
+  );
   expect(frames).toBe(0);
   expect(bed.server.requests.length).toBe(asked);
 });
@@ -253,7 +274,8 @@ test("a restored WebGL context shows the same picture", async () => {
 test("dragging moves the ground with the pointer; the wheel zooms about it", async () => {
   const { page } = await recorded();
   const ground: [number, number, number] = [ORIGIN[0], ORIGIN[1], ORIGIN[2]];
-  const at = (): Promise<[number, number]> => page.evaluate((world) => (globalThis as Global).map.project(world) as [number, number], ground);
+  const at = (): Promise<[number, number]> =>
+    page.evaluate((world) => (globalThis as Global).map.project(world) as [number, number], ground);
   const start = await at();
   await page.mouse.move(...start);
   await page.mouse.down();
@@ -273,10 +295,15 @@ test("dragging moves the ground with the pointer; the wheel zooms about it", asy
 
 test("without WebGL2 the map reports it in an event and in the page", async () => {
   const { page } = await bed.bare();
-  const message = await page.evaluate(() => new Promise<string>((done) => {
-    HTMLCanvasElement.prototype.getContext = () => null;
-    new (globalThis as Global).map3d.map("mapcanvas").on("error", ({ error }) => { done(error.message); });
-  }));
+  const message = await page.evaluate(
+    () =>
+      new Promise<string>((done) => {
+        HTMLCanvasElement.prototype.getContext = () => null;
+        new (globalThis as Global).map3d.map("mapcanvas").on("error", ({ error }) => {
+          done(error.message);
+        });
+      }),
+  );
   expect(message).toContain("WebGL2");
   expect(await page.locator(".map3d-message").textContent()).toContain("WebGL2");
 });

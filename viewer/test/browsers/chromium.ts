@@ -4,7 +4,10 @@ import { Driver } from "./driver";
 
 /** Chromium, whose pictures are the reference. It accepts no input. */
 export class Chromium extends Driver {
-  private constructor(private readonly page: Page, readonly complaints: readonly string[]) {
+  private constructor(
+    private readonly page: Page,
+    readonly complaints: readonly string[],
+  ) {
     super();
   }
 

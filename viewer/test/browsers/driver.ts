@@ -2,7 +2,12 @@ import { decodePng } from "../../src/core/png";
 
 /** An input source and its actions, as in WebDriver and WebDriver BiDi. */
 export type Input =
-  | { readonly type: "pointer"; readonly id: string; readonly parameters: { readonly pointerType: "mouse" }; readonly actions: readonly object[] }
+  | {
+      readonly type: "pointer";
+      readonly id: string;
+      readonly parameters: { readonly pointerType: "mouse" };
+      readonly actions: readonly object[];
+    }
   | { readonly type: "wheel" | "key"; readonly id: string; readonly actions: readonly object[] };
 
 type Point = readonly [x: number, y: number];
@@ -62,11 +67,26 @@ export abstract class Driver {
   }
 
   async wheel([x, y]: Point, deltaY: number): Promise<void> {
-    await this.perform([{ type: "wheel", id: "wheel", actions: [{ type: "scroll", x: Math.round(x), y: Math.round(y), deltaX: 0, deltaY, duration: 0, origin: "viewport" }] }]);
+    await this.perform([
+      {
+        type: "wheel",
+        id: "wheel",
+        actions: [{ type: "scroll", x: Math.round(x), y: Math.round(y), deltaX: 0, deltaY, duration: 0, origin: "viewport" }],
+      },
+    ]);
   }
 
   async key(value: string): Promise<void> {
-    await this.perform([{ type: "key", id: "keys", actions: [{ type: "keyDown", value }, { type: "keyUp", value }] }]);
+    await this.perform([
+      {
+        type: "key",
+        id: "keys",
+        actions: [
+          { type: "keyDown", value },
+          { type: "keyUp", value },
+        ],
+      },
+    ]);
   }
 
   async #mouse(actions: readonly object[]): Promise<void> {
@@ -76,5 +96,14 @@ export abstract class Driver {
 
 const DOWN = { type: "pointerDown", button: 0 };
 const UP = { type: "pointerUp", button: 0 };
-const moveTo = ([x, y]: Point, duration = 0): object => ({ type: "pointerMove", x: Math.round(x), y: Math.round(y), duration, origin: "viewport" });
-const pause = (ms: number): Promise<void> => new Promise((done) => { setTimeout(done, ms); });
+const moveTo = ([x, y]: Point, duration = 0): object => ({
+  type: "pointerMove",
+  x: Math.round(x),
+  y: Math.round(y),
+  duration,
+  origin: "viewport",
+});
+const pause = (ms: number): Promise<void> =>
+  new Promise((done) => {
+    setTimeout(done, ms);
+  });

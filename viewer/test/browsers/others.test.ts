@@ -13,7 +13,26 @@ import type { Driver, Screenshot } from "./driver";
 import { HEIGHT, WIDTH, watchedPage, type Watched } from "./page";
 import { difference, takeScreenshots } from "./scenes";
 
-const PLAN: Place = { name: "plan", origin: [ORIGIN[0] + 13.7, ORIGIN[1] - 8.3, ORIGIN[2] + 1.5], box: [[-130, -30, -3], [20, 40, 30]], things: [{ id: 77, name: "Planned house", box: [[-130, -20, -3], [6, 30, 26]], wall: [240, 120, 30], roof: [250, 60, 60] }] };
+const PLAN: Place = {
+  name: "plan",
+  origin: [ORIGIN[0] + 13.7, ORIGIN[1] - 8.3, ORIGIN[2] + 1.5],
+  box: [
+    [-130, -30, -3],
+    [20, 40, 30],
+  ],
+  things: [
+    {
+      id: 77,
+      name: "Planned house",
+      box: [
+        [-130, -20, -3],
+        [6, 30, 26],
+      ],
+      wall: [240, 120, 30],
+      roof: [250, 60, 60],
+    },
+  ],
+};
 const [town, noise] = [renderTown(), renderNoise(11)];
 const server = serve({ town, noise, later: renderLater(), plan: renderTown(128, 0.29, PLAN) });
 watchedPage(server);
@@ -37,8 +56,10 @@ async function started(driver: Driver, rendering: string, options: object): Prom
   await driver.evaluate(begin, [url(rendering), { ...BARE, ...options }, {}] as const);
 }
 
-const told = (driver: Driver): Promise<string[]> => driver.evaluate(() => [...(globalThis as Watched).problems, ...(globalThis as Global).errors], null);
-const at = (driver: Driver, world: readonly [number, number, number]): Promise<[number, number]> => driver.evaluate((point) => (globalThis as Global).map.project(point) as [number, number], world);
+const told = (driver: Driver): Promise<string[]> =>
+  driver.evaluate(() => [...(globalThis as Watched).problems, ...(globalThis as Global).errors], null);
+const at = (driver: Driver, world: readonly [number, number, number]): Promise<[number, number]> =>
+  driver.evaluate((point) => (globalThis as Global).map.project(point) as [number, number], world);
 
 /** Chromium's pictures by drawer. */
 const wanted = new Map<string, Map<string, Screenshot>>();
@@ -61,8 +82,10 @@ for (const { name, perturbs, start, missing } of OTHER_BROWSERS) {
   describe.skipIf(missing !== null)(name, () => {
     let driver: Awaited<ReturnType<typeof start>> | undefined;
     const its = (): NonNullable<typeof driver> => driver as NonNullable<typeof driver>;
-    const complaints = async (): Promise<string[]> => [...await told(its()), ...its().complaints];
-    beforeAll(async () => { driver = await start(display as Display); });
+    const complaints = async (): Promise<string[]> => [...(await told(its())), ...its().complaints];
+    beforeAll(async () => {
+      driver = await start(display as Display);
+    });
     afterAll(() => driver?.close());
 
     test.each(DRAWERS)("%s: pictures match Chromium's", async (drawer) => {
@@ -98,7 +121,11 @@ for (const { name, perturbs, start, missing } of OTHER_BROWSERS) {
     test.skipIf(!perturbs)("pixels read from a canvas differ from those drawn, or the test would be void", async () => {
       const same = await its().evaluate(() => {
         const context = new OffscreenCanvas(64, 64).getContext("2d") as OffscreenCanvasRenderingContext2D;
-        const drawn = new ImageData(Uint8ClampedArray.from({ length: 4 * 64 * 64 }, (_, k) => (k % 4 === 3 ? 255 : (k * 37) & 255)), 64, 64);
+        const drawn = new ImageData(
+          Uint8ClampedArray.from({ length: 4 * 64 * 64 }, (_, k) => (k % 4 === 3 ? 255 : (k * 37) & 255)),
+          64,
+          64,
+        );
         context.putImageData(drawn, 0, 0);
         return context.getImageData(0, 0, 64, 64).data.every((byte, k) => byte === drawn.data[k]);
       }, null);
@@ -114,18 +141,32 @@ for (const { name, perturbs, start, missing } of OTHER_BROWSERS) {
       expect(dragged[1] - first[1]).toBeCloseTo(-40, -0.3);
       await its().wheel(dragged, -240);
       await its().until(() => (globalThis as Global).map.zoom > 2.5, null);
-      await its().until((before) => Math.abs((globalThis as Global).map.zoom - before) < 1, await its().evaluate(() => (globalThis as Global).map.zoom, null));
+      await its().until(
+        (before) => Math.abs((globalThis as Global).map.zoom - before) < 1,
+        await its().evaluate(() => (globalThis as Global).map.zoom, null),
+      );
       const zoomed = await at(its(), ROOF);
       expect(Math.hypot(zoomed[0] - dragged[0], zoomed[1] - dragged[1])).toBeLessThan(3);
       await its().click(zoomed);
       await its().until(() => (globalThis as Global).clicks.length > 0, null);
-      const click = await its().evaluate(() => (({ id, position, approximate, name: said }) => ({ id, position, approximate, said }))((globalThis as Global).clicks[0] as Global["clicks"][0]), null);
+      const click = await its().evaluate(
+        () =>
+          (({ id, position, approximate, name: said }) => ({ id, position, approximate, said }))(
+            (globalThis as Global).clicks[0] as Global["clicks"][0],
+          ),
+        null,
+      );
       expect(click).toMatchObject({ id: 17, approximate: false, said: "Town hall" });
       expect(click.position?.[2]).toBeCloseTo(ROOF[2], 2);
       expect(Math.hypot(...ROOF.map((part, k) => part - (click.position?.[k] ?? 0)))).toBeLessThan(0.8);
-      await its().evaluate(() => { (globalThis as Global).map.container.focus(); }, null);
+      await its().evaluate(() => {
+        (globalThis as Global).map.container.focus();
+      }, null);
       await its().key(ARROW_RIGHT);
-      await its().until(([world, x]) => Math.abs(((globalThis as Global).map.project(world)?.[0] ?? 0) - x) < 1, [ROOF, zoomed[0] - 90] as const);
+      await its().until(([world, x]) => Math.abs(((globalThis as Global).map.project(world)?.[0] ?? 0) - x) < 1, [
+        ROOF,
+        zoomed[0] - 90,
+      ] as const);
       await its().key("q");
       await its().until(() => (globalThis as Global).map.direction === "90-45", null);
       expect(await complaints()).toEqual([]);
@@ -137,16 +178,24 @@ for (const { name, perturbs, start, missing } of OTHER_BROWSERS) {
         writeFileSync(`${OUT}/${name.toLowerCase().replaceAll(" ", "-")}-${example}.png`, shot.png);
         return shot;
       };
-      const colours = ({ rgb }: Screenshot): number => new Set(Array.from({ length: rgb.length / 3 }, (_, k) => rgb.subarray(3 * k, 3 * k + 3).join())).size;
+      const colours = ({ rgb }: Screenshot): number =>
+        new Set(Array.from({ length: rgb.length / 3 }, (_, k) => rgb.subarray(3 * k, 3 * k + 3).join())).size;
       await its().open(`${server.origin}/examples/directions.html`);
       await its().until(() => maps.every((each) => each.loaded()), null);
-      expect(await its().evaluate(() => [...document.querySelectorAll(".map3d-facing")].map((caption) => caption.textContent.replace(/.* /, "")), null)).toEqual(["north", "east", "south", "west"]);
+      expect(
+        await its().evaluate(
+          () => [...document.querySelectorAll(".map3d-facing")].map((caption) => caption.textContent.replace(/.* /, "")),
+          null,
+        ),
+      ).toEqual(["north", "east", "south", "west"]);
       expect(await its().evaluate(() => maps.map((each) => each.direction), null)).toEqual(["0-45", "270-45", "180-45", "90-45"]);
       expect(colours(await keep("directions"))).toBeGreaterThan(24);
       await its().open(`${server.origin}/examples/times.html`);
       await its().until(() => map.loaded() && map.layers.length === 2, null);
       expect(colours(await keep("times"))).toBeGreaterThan(24);
-      await its().evaluate(() => { document.getElementById("switch")?.click(); }, null);
+      await its().evaluate(() => {
+        document.getElementById("switch")?.click();
+      }, null);
       await its().until(() => map.loaded() && map.layers.length === 1 && right.loaded(), null);
       expect(await its().evaluate(() => [before, after].map(({ rendering }) => rendering?.json.name), null)).toEqual(["town", "later"]);
       await keep("side-by-side");
@@ -167,10 +216,16 @@ for (const { name, perturbs, start, missing } of OTHER_BROWSERS) {
       await its().click([x, y]);
       await its().until(() => document.querySelector(".map3d-popup-body")?.textContent === "Open till five", null);
       writeFileSync(`${OUT}/${name.toLowerCase().replaceAll(" ", "-")}-marker.png`, (await its().shot()).png);
-      const outside = await its().evaluate(([width, height]) => [...document.querySelectorAll(".map3d-group button, .map3d-popup, .map3d-scale, .map3d-attribution")].filter((found) => {
-        const box = found.getBoundingClientRect();
-        return box.left < 0 || box.top < 0 || box.right > width || box.bottom > height;
-      }).map((found) => found.outerHTML.slice(0, 80)), [WIDTH, HEIGHT] as const);
+      const outside = await its().evaluate(
+        ([width, height]) =>
+          [...document.querySelectorAll(".map3d-group button, .map3d-popup, .map3d-scale, .map3d-attribution")]
+            .filter((found) => {
+              const box = found.getBoundingClientRect();
+              return box.left < 0 || box.top < 0 || box.right > width || box.bottom > height;
+            })
+            .map((found) => found.outerHTML.slice(0, 80)),
+        [WIDTH, HEIGHT] as const,
+      );
       expect(outside).toEqual([]);
       expect(await complaints()).toEqual([]);
     });
@@ -182,7 +237,13 @@ for (const { name, perturbs, start, missing } of OTHER_BROWSERS) {
  * pixel, else up to 19 at edges on 1.3 % of the pixels, since browsers scale pictures with their own weights; composited light 4 on 4.2 %,
  * both together 18 on 23 %.
  */
-const TOLERANCE = { webgl: { most: 2, off: 0 }, whole: { most: 1, off: 0 }, scaled: { most: 32, off: 0.03 }, composed: { most: 8, off: 0.08 }, both: { most: 32, off: 0.4 } } as const;
+const TOLERANCE = {
+  webgl: { most: 2, off: 0 },
+  whole: { most: 1, off: 0 },
+  scaled: { most: 32, off: 0.03 },
+  composed: { most: 8, off: 0.08 },
+  both: { most: 32, off: 0.4 },
+} as const;
 const SCALED = ["two layers", "turned", "between"];
 
 function toleranceOf(scene: string, composed: boolean): keyof typeof TOLERANCE {

@@ -37,7 +37,9 @@ export function difference(a: Screenshot, b: Screenshot): Difference {
   let [most, off] = [0, 0];
   for (let p = 0; p < WIDTH * HEIGHT; p++) {
     const [x, y] = [p % WIDTH, Math.floor(p / WIDTH)];
-    const apart = Math.max(...[0, 1, 2].map((k) => Math.abs((a.rgb[3 * (y * a.width + x) + k] ?? 0) - (b.rgb[3 * (y * b.width + x) + k] ?? 0))));
+    const apart = Math.max(
+      ...[0, 1, 2].map((k) => Math.abs((a.rgb[3 * (y * a.width + x) + k] ?? 0) - (b.rgb[3 * (y * b.width + x) + k] ?? 0))),
+    );
     most = Math.max(most, apart);
     if (apart > 2) off++;
   }

@@ -9,8 +9,17 @@ export const WEBKIT_DRIVER = process.env["WEBKIT_DRIVER"] ?? "/usr/bin/WebKitWeb
 
 /** The minimal browser of WebKitGTK; in Debian next to its library. */
 export function miniBrowser(): string | undefined {
-  const folders = ["/usr/lib", ...(existsSync("/usr/lib") ? readdirSync("/usr/lib").filter((name) => name.endsWith("-linux-gnu")).map((name) => `/usr/lib/${name}`) : [])];
-  const places = folders.flatMap((folder) => ["webkitgtk-6.0", "webkit2gtk-4.1", "webkit2gtk-4.0"].map((name) => `${folder}/${name}/MiniBrowser`));
+  const folders = [
+    "/usr/lib",
+    ...(existsSync("/usr/lib")
+      ? readdirSync("/usr/lib")
+          .filter((name) => name.endsWith("-linux-gnu"))
+          .map((name) => `/usr/lib/${name}`)
+      : []),
+  ];
+  const places = folders.flatMap((folder) =>
+    ["webkitgtk-6.0", "webkit2gtk-4.1", "webkit2gtk-4.0"].map((name) => `${folder}/${name}/MiniBrowser`),
+  );
   return places.find((place) => existsSync(place));
 }
 
@@ -18,7 +27,10 @@ export function miniBrowser(): string | undefined {
 export class WebKit extends Driver {
   readonly complaints: readonly string[] = [];
 
-  private constructor(private readonly child: ChildProcess, private readonly session: string) {
+  private constructor(
+    private readonly child: ChildProcess,
+    private readonly session: string,
+  ) {
     super();
   }
 
@@ -29,7 +41,9 @@ export class WebKit extends Driver {
     const child = spawn(WEBKIT_DRIVER, [`--port=${String(port)}`], { stdio: "ignore", env });
     const browser = { binary: miniBrowser(), args: ["--automation"] };
     const address = `http://127.0.0.1:${String(port)}/session`;
-    const { sessionId } = await patiently(() => ask("POST", address, { capabilities: { alwaysMatch: { "webkitgtk:browserOptions": browser } } })) as { sessionId: string };
+    const { sessionId } = (await patiently(() =>
+      ask("POST", address, { capabilities: { alwaysMatch: { "webkitgtk:browserOptions": browser } } }),
+    )) as { sessionId: string };
     const webkit = new WebKit(child, `${address}/${sessionId}`);
     await webkit.#post("/timeouts", { script: 60_000, pageLoad: 60_000 });
     await webkit.#post("/window/rect", { width: 800, height: 600 });
@@ -46,7 +60,7 @@ export class WebKit extends Driver {
 
   async run(expression: string): Promise<unknown> {
     const script = `const done = arguments[arguments.length - 1]; (async () => ({ value: (await ${expression}) ?? null }))().then((it) => done(JSON.stringify(it)), (reason) => done(JSON.stringify({ error: String(reason) })));`;
-    const answer = JSON.parse(await this.#post("/execute/async", { script, args: [] }) as string) as { value?: unknown; error?: string };
+    const answer = JSON.parse((await this.#post("/execute/async", { script, args: [] })) as string) as { value?: unknown; error?: string };
     if (answer.error !== undefined) throw new Error(answer.error);
     return answer.value;
   }
@@ -57,7 +71,7 @@ export class WebKit extends Driver {
   }
 
   protected async capture(): Promise<Buffer> {
-    return Buffer.from(await ask("GET", `${this.session}/screenshot`) as string, "base64");
+    return Buffer.from((await ask("GET", `${this.session}/screenshot`)) as string, "base64");
   }
 
   #post(path: string, body: object): Promise<unknown> {
@@ -67,13 +81,18 @@ export class WebKit extends Driver {
 
 /** Repeating a wheel step has no effect, so the wheel pauses in between. */
 function unlikeLast(input: Input): Input {
-  return input.type === "wheel" ? { ...input, actions: input.actions.flatMap((action) => [{ ...action, deltaX: 0, deltaY: 0 }, action]) } : input;
+  return input.type === "wheel"
+    ? { ...input, actions: input.actions.flatMap((action) => [{ ...action, deltaX: 0, deltaY: 0 }, action]) }
+    : input;
 }
 
 /** @throws Error with the driver's message */
 async function ask(method: string, address: string, body?: object): Promise<unknown> {
-  const response = await fetch(address, { method, ...(body && { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } }) });
-  const { value } = await response.json() as { value: { error?: string; message?: string } | null };
+  const response = await fetch(address, {
+    method,
+    ...(body && { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } }),
+  });
+  const { value } = (await response.json()) as { value: { error?: string; message?: string } | null };
   if (!response.ok) throw new Error(`${method} ${address}: ${value?.error ?? ""} ${value?.message ?? ""}`);
   return value;
 }
@@ -85,7 +104,9 @@ async function patiently<T>(act: () => Promise<T>): Promise<T> {
       return await act();
     } catch (reason) {
       if (left === 0 || !(reason instanceof TypeError)) throw reason;
-      await new Promise((done) => { setTimeout(done, 100); });
+      await new Promise((done) => {
+        setTimeout(done, 100);
+      });
     }
   }
 }
@@ -94,7 +115,9 @@ function freePort(): Promise<number> {
   return new Promise((done) => {
     const server = createServer().listen(0, "127.0.0.1", () => {
       const { port } = server.address() as AddressInfo;
-      server.close(() => { done(port); });
+      server.close(() => {
+        done(port);
+      });
     });
   });
 }

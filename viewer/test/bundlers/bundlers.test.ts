@@ -36,7 +36,20 @@ await resting;
 const town = await layer.object(17);
 Object.assign(globalThis, { found: { name: town?.name, height: town?.attributes["measuredHeight"], length: length.length_m, one: new measure() instanceof Evented && element.map instanceof map, classes: colors.classes.length } });
 `;
-const settings = (module: string, moduleResolution: string): string => JSON.stringify({ compilerOptions: { target: "es2022", lib: ["es2023", "dom", "dom.iterable"], strict: true, exactOptionalPropertyTypes: true, noEmit: true, types: [], module, moduleResolution }, files: ["app.ts"] });
+const settings = (module: string, moduleResolution: string): string =>
+  JSON.stringify({
+    compilerOptions: {
+      target: "es2022",
+      lib: ["es2023", "dom", "dom.iterable"],
+      strict: true,
+      exactOptionalPropertyTypes: true,
+      noEmit: true,
+      types: [],
+      module,
+      moduleResolution,
+    },
+    files: ["app.ts"],
+  });
 
 let installed: Installation;
 beforeAll(() => {
@@ -48,32 +61,61 @@ beforeAll(() => {
     "node16.json": settings("node16", "node16"),
   });
 });
-afterAll(() => { installed.remove(); });
+afterAll(() => {
+  installed.remove();
+});
 
 test.each(["bundler", "node16"])("types are found with moduleResolution %s", async (kind) => {
-  const { stdout } = await run(process.execPath, [join(VIEWER, "node_modules/typescript/bin/tsc"), "-p", installed.path(`${kind}.json`)]).catch((reason: unknown) => reason as { stdout: string });
+  const { stdout } = await run(process.execPath, [
+    join(VIEWER, "node_modules/typescript/bin/tsc"),
+    "-p",
+    installed.path(`${kind}.json`),
+  ]).catch((reason: unknown) => reason as { stdout: string });
   expect(stdout).toBe("");
 });
 
 const bundlers: Record<string, (entry: string) => Promise<string>> = {
-  esbuild: async (entry) => (await esbuild.build({ entryPoints: [entry], bundle: true, minify: true, format: "esm", write: false })).outputFiles[0]?.text ?? "",
+  esbuild: async (entry) =>
+    (await esbuild.build({ entryPoints: [entry], bundle: true, minify: true, format: "esm", write: false })).outputFiles[0]?.text ?? "",
   vite: async (entry) => {
-    const made = (await viteBuild({ root: installed.folder, configFile: false, logLevel: "error", build: { write: false, target: "es2022", rolldownOptions: { input: entry } } })) as Rolldown.RolldownOutput;
+    const made = (await viteBuild({
+      root: installed.folder,
+      configFile: false,
+      logLevel: "error",
+      build: { write: false, target: "es2022", rolldownOptions: { input: entry } },
+    })) as Rolldown.RolldownOutput;
     expect(made.output.length).toBe(1);
     return made.output[0].code;
   },
 };
 
-test.each([["esbuild", "app.ts"], ["vite", "app.ts"], ["esbuild", "full.ts"]])("an app bundled by %s from %s runs, with one core and workers from a blob", async (bundler, entry) => {
-  const code = await bundlers[bundler]?.(installed.path(entry)) ?? "";
+test.each([
+  ["esbuild", "app.ts"],
+  ["vite", "app.ts"],
+  ["esbuild", "full.ts"],
+])("an app bundled by %s from %s runs, with one core and workers from a blob", async (bundler, entry) => {
+  const code = (await bundlers[bundler]?.(installed.path(entry))) ?? "";
   expect(code.match(/an imageLayer needs/g)?.length).toBe(1);
-  bed.server.pages.set("/app.js", code).set("/app", '<!doctype html><html lang="en"><head><title>app</title><link rel="icon" href="data:,"><link rel="stylesheet" href="/bare.css"></head><body><canvas id="mapcanvas"></canvas><script type="module" src="/app.js"></script></body></html>');
+  bed.server.pages
+    .set("/app.js", code)
+    .set(
+      "/app",
+      '<!doctype html><html lang="en"><head><title>app</title><link rel="icon" href="data:,"><link rel="stylesheet" href="/bare.css"></head><body><canvas id="mapcanvas"></canvas><script type="module" src="/app.js"></script></body></html>',
+    );
   const { page, problems } = await bed.openPage();
   const workers: string[] = [];
-  page.on("worker", (worker) => { workers.push(worker.url()); });
+  page.on("worker", (worker) => {
+    workers.push(worker.url());
+  });
   await page.goto(`${bed.server.origin}/app`);
   await page.waitForFunction(() => "found" in globalThis);
-  expect(await page.evaluate(() => (globalThis as unknown as { found: unknown }).found)).toEqual({ name: "Town hall", height: 34, length: 34, one: true, classes: 5 });
+  expect(await page.evaluate(() => (globalThis as unknown as { found: unknown }).found)).toEqual({
+    name: "Town hall",
+    height: 34,
+    length: 34,
+    one: true,
+    classes: 5,
+  });
   expect(workers.length).toBeGreaterThan(0);
   for (const url of workers) expect(url).toMatch(/^blob:/);
   expect(problems).toEqual([]);

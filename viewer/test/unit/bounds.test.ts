@@ -6,7 +6,18 @@ import { Motion } from "../../src/map/motion";
 
 const frame = makeFrame({ id: "0-90", look_at_deg: 0, pitch_deg: 90, u0_m: -512, v0_m: 512, d0_m: -1000 }, 1024, 256, 4);
 const camera: Camera = { frame, u: 0, v: 0, zoom: 2, width: 800, height: 600 }; // a metre per CSS pixel
-const limits: Limits = { box: [[-100, -50, 0], [100, 50, 10]], bounds: [[-100, -50, 0], [100, 50, 10]], minZoom: undefined, maxZoom: undefined };
+const limits: Limits = {
+  box: [
+    [-100, -50, 0],
+    [100, 50, 10],
+  ],
+  bounds: [
+    [-100, -50, 0],
+    [100, 50, 10],
+  ],
+  minZoom: undefined,
+  maxZoom: undefined,
+};
 
 describe("zoom limits", () => {
   test("follow the content and the deepest level", () => {
@@ -44,20 +55,26 @@ describe("bounds", () => {
     expect(panSoftly(at, 30, 0, limits).u).toBeCloseTo(at.u - 30, 9); // back without resistance
   });
 
-  test.each([[[0, 0]], [[-2, -0.5]]])("after a drag beyond, with a velocity of %j, the picture springs back and rests at the edge", (velocity) => {
-    const motion = new Motion(() => undefined, (each) => limitCamera(each, limits));
-    let at: Camera = { ...camera, u: 180, v: -80 };
-    motion.startInertia(velocity as [number, number], (each, dx, dy) => panSoftly(each, dx, dy, limits));
-    const start = performance.now();
-    const path: number[] = [];
-    for (let k = 1; motion.moving && k < 400; k++) {
-      at = motion.step(start + 16 * k, at);
-      path.push(at.u);
-    }
-    expect(motion.moving).toBe(false);
-    expect(path.length).toBeGreaterThan(10);
-    expect(path.length).toBeLessThan(120);
-    expect([at.u, at.v]).toEqual([100, -50]);
-    expect(Math.max(...path)).toBeLessThanOrEqual(300);
-  });
+  test.each([[[0, 0]], [[-2, -0.5]]])(
+    "after a drag beyond, with a velocity of %j, the picture springs back and rests at the edge",
+    (velocity) => {
+      const motion = new Motion(
+        () => undefined,
+        (each) => limitCamera(each, limits),
+      );
+      let at: Camera = { ...camera, u: 180, v: -80 };
+      motion.startInertia(velocity as [number, number], (each, dx, dy) => panSoftly(each, dx, dy, limits));
+      const start = performance.now();
+      const path: number[] = [];
+      for (let k = 1; motion.moving && k < 400; k++) {
+        at = motion.step(start + 16 * k, at);
+        path.push(at.u);
+      }
+      expect(motion.moving).toBe(false);
+      expect(path.length).toBeGreaterThan(10);
+      expect(path.length).toBeLessThan(120);
+      expect([at.u, at.v]).toEqual([100, -50]);
+      expect(Math.max(...path)).toBeLessThanOrEqual(300);
+    },
+  );
 });

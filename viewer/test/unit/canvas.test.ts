@@ -1,6 +1,12 @@
 import { describe, expect, test } from "vitest";
 import type { LayerPass } from "../../src/draw/drawer";
-import { listNeighbourKinds, listKinds, makeShadingOptions, type ShadingOptions, type TileLight } from "../../src/draw/canvas/shadingOptions";
+import {
+  listNeighbourKinds,
+  listKinds,
+  makeShadingOptions,
+  type ShadingOptions,
+  type TileLight,
+} from "../../src/draw/canvas/shadingOptions";
 import { computeTileLight, type LightLayers } from "../../src/draw/canvas/tileLight";
 import type { DrawStyles } from "../../src/draw/drawStyle";
 import { computeIdColor, shadeTile, type TileNeighbours, type StylesById } from "../../src/draw/canvas/shadeTile";
@@ -9,8 +15,24 @@ import { placeQuads } from "../../src/draw/quads";
 import { makeFrame } from "../../src/geo/frame";
 import { DEFAULT_LIGHT, towardsLight } from "../../src/geo/light";
 
-const LIGHT: TileLight = { sun: towardsLight(DEFAULT_LIGHT), sky: [0.42, 0.42, 0.42], beam: [0.76, 0.76, 0.76], occlusion: false, shadow: null };
-const OPTIONS: ShadingOptions = { mode: "id", masked: false, light: null, highlight: null, styles: null, rim: [0, 0], depthRange: null, combined: false, masks: [] };
+const LIGHT: TileLight = {
+  sun: towardsLight(DEFAULT_LIGHT),
+  sky: [0.42, 0.42, 0.42],
+  beam: [0.76, 0.76, 0.76],
+  occlusion: false,
+  shadow: null,
+};
+const OPTIONS: ShadingOptions = {
+  mode: "id",
+  masked: false,
+  light: null,
+  highlight: null,
+  styles: null,
+  rim: [0, 0],
+  depthRange: null,
+  combined: false,
+  masks: [],
+};
 const NO_STYLES: StylesById = { colors: undefined, styles: undefined };
 const NO_NEIGHBOURS: TileNeighbours = { lightLayers: [], id: [], masks: [] };
 const bytes = (...normal: number[][]): LightLayers => ({ normal: Uint8Array.from(normal.flat()) });
@@ -21,7 +43,7 @@ const NOTHING = [0, 0, 0];
 /** Fraction of sunlight on a stored normal. */
 const strength = (stored: number[]): number => {
   const n = stored.map((byte) => (byte / 255) * 2 - 1);
-  const cosine = n.reduce((sum, part, k) => sum + part * (LIGHT.sun[k as 0]), 0) / Math.hypot(...n);
+  const cosine = n.reduce((sum, part, k) => sum + part * LIGHT.sun[k as 0], 0) / Math.hypot(...n);
   return Math.max(0, cosine);
 };
 
@@ -50,7 +72,12 @@ describe("light", () => {
   test("is dimmed by each pixel's own occlusion and shadow", () => {
     const shades = (ao: number, suns: number): LightLayers => ({ ...bytes(UP), ao: Uint8Array.of(ao), shadow: Uint16Array.of(suns) });
     const lamp: TileLight = { ...LIGHT, occlusion: true, shadow: { kind: "sun16", first: 3, second: 4, share: 0.25 } };
-    const [sky, sun] = computeTileLight(lamp, 1, 1, shades(255, 0b01000), [shades(51, 0b10000), shades(51, 0), shades(255, 0b11000), undefined]);
+    const [sky, sun] = computeTileLight(lamp, 1, 1, shades(255, 0b01000), [
+      shades(51, 0b10000),
+      shades(51, 0),
+      shades(255, 0b11000),
+      undefined,
+    ]);
     expect(sky).toBeCloseTo(0.5 + (0.2 + 0.2 + 1 + 1) / 8, 6);
     expect(sun).toBeCloseTo(strength(UP) * (0.75 / 2 + (0.25 + 0 + 1 + 0.75) / 8), 6);
   });
@@ -77,7 +104,10 @@ describe("a shaded tile", () => {
   test("has a highlight's rim where a neighbouring id differs, also across the tile's edge", () => {
     const options = { ...OPTIONS, highlight: "h", rim: [1, -1] as const };
     const rims = (neighbours: TileNeighbours): number[] => {
-      const out = shadeTile(options, { width: 3, height: 3, id: new Uint32Array(9).fill(7) }, neighbours, { ...NO_STYLES, colors: new Map([[7, [1, 0, 0]]]) });
+      const out = shadeTile(options, { width: 3, height: 3, id: new Uint32Array(9).fill(7) }, neighbours, {
+        ...NO_STYLES,
+        colors: new Map([[7, [1, 0, 0]]]),
+      });
       return [0, 1, 2, 3, 4, 5, 6, 7, 8].filter((at) => out[4 * at] === 255 && out[4 * at + 1] === 0);
     };
     expect(rims(NO_NEIGHBOURS)).toEqual([]);
@@ -102,13 +132,25 @@ describe("a shaded tile", () => {
   });
 
   test("in mode depth runs from the first to the last colour", () => {
-    const out = shadeTile({ ...OPTIONS, mode: "depth", depthRange: [100, 300] }, { width: 2, height: 2, depth: Uint32Array.of(0, 200, 5000, 0xffffffff) }, NO_NEIGHBOURS, NO_STYLES);
+    const out = shadeTile(
+      { ...OPTIONS, mode: "depth", depthRange: [100, 300] },
+      { width: 2, height: 2, depth: Uint32Array.of(0, 200, 5000, 0xffffffff) },
+      NO_NEIGHBOURS,
+      NO_STYLES,
+    );
     expect([...out]).toEqual([252, 232, 178, 255, 92, 158, 158, 255, 41, 46, 92, 255, 0, 0, 0, 0]);
   });
 });
 
 describe("shading options", () => {
-  const pass = { mode: "lit", masked: true, depths: null, clip: null, depthRange: [0, 9], bakedLight: { shadow: null, occlusion: false } } as unknown as LayerPass;
+  const pass = {
+    mode: "lit",
+    masked: true,
+    depths: null,
+    clip: null,
+    depthRange: [0, 9],
+    bakedLight: { shadow: null, occlusion: false },
+  } as unknown as LayerPass;
   const frame = { width: 1, height: 1, dpr: 1, light: DEFAULT_LIGHT, passes: [] };
 
   test("list the layers that a tile needs, and those that matter beyond its edges", () => {
@@ -119,7 +161,9 @@ describe("shading options", () => {
 
   test("do not depend on a light that is off", () => {
     const dark = { ...frame, light: { ...DEFAULT_LIGHT, lit: false } };
-    expect(makeShadingOptions(dark, pass, 1, { highlight: null, styles: null })).toEqual(makeShadingOptions({ ...dark, light: { ...dark.light, azimuth_deg: 3 } }, pass, 2, { highlight: null, styles: null }));
+    expect(makeShadingOptions(dark, pass, 1, { highlight: null, styles: null })).toEqual(
+      makeShadingOptions({ ...dark, light: { ...dark.light, azimuth_deg: 3 } }, pass, 2, { highlight: null, styles: null }),
+    );
     expect(listKinds(makeShadingOptions(dark, { ...pass, masked: false }, 1, { highlight: null, styles: null }))).toEqual(["color"]);
   });
 });
@@ -127,7 +171,11 @@ describe("shading options", () => {
 test("areas are recovered from their rectangles at any zoom", () => {
   const frame = makeFrame({ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512, v0_m: 512, d0_m: 0 }, 1024, 256, 5);
   for (const px_m of [1, 0.7, 0.31, 0.123]) {
-    const fallbacks = [{ area: { z: 4, x: 9, y: 3 }, from: { z: 4, x: 9, y: 3 } }, { area: { z: 4, x: 10, y: 3 }, from: { z: 1, x: 1, y: 0 } }, { area: { z: 6, x: 44, y: 15 }, from: { z: 6, x: 44, y: 15 } }];
+    const fallbacks = [
+      { area: { z: 4, x: 9, y: 3 }, from: { z: 4, x: 9, y: 3 } },
+      { area: { z: 4, x: 10, y: 3 }, from: { z: 1, x: 1, y: 0 } },
+      { area: { z: 6, x: 44, y: 15 }, from: { z: 6, x: 44, y: 15 } },
+    ];
     const quads = placeQuads(frame, { left: -77.3, top: 41.9, px_m }, fallbacks, 4);
     for (const quad of quads) {
       const grid = makeGrid({ quads: [quad], level: 4 } as unknown as LayerPass, 256);

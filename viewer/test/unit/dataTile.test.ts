@@ -15,12 +15,19 @@ interface TileVector {
   depth: number[];
 }
 
-const vectors = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../spec/vectors/data-tiles.json"), "utf8")) as { tiles: TileVector[]; refused: { why: string; base64: string }[] };
+const vectors = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../spec/vectors/data-tiles.json"), "utf8")) as {
+  tiles: TileVector[];
+  refused: { why: string; base64: string }[];
+};
 
 const bytesOf = (base64: string): Uint8Array<ArrayBuffer> => new Uint8Array(Buffer.from(base64, "base64"));
 
 const KINDS = ["normal", "id", "depth"] as const;
-const decodeAll = async (bytes: Uint8Array<ArrayBuffer>): Promise<DataTile[]> => [await decodeDataTile(bytes, KINDS[0]), await decodeDataTile(bytes, KINDS[1]), await decodeDataTile(bytes, KINDS[2])];
+const decodeAll = async (bytes: Uint8Array<ArrayBuffer>): Promise<DataTile[]> => [
+  await decodeDataTile(bytes, KINDS[0]),
+  await decodeDataTile(bytes, KINDS[1]),
+  await decodeDataTile(bytes, KINDS[2]),
+];
 
 /** Changes a body and deflates it again. */
 const packed = (tile: Uint8Array, change: (body: Uint8Array) => void): Uint8Array<ArrayBuffer> => {

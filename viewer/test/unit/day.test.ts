@@ -3,15 +3,20 @@ import { getPosition } from "suncalc";
 import { PLACE } from "../fixture/town";
 import { findDay, type Day } from "../../page/day";
 
-const dayOf = (lat: number, date: string, zone: number): Day => findDay((hour) => getPosition(new Date(Date.parse(`${date}T00:00Z`) + (hour - zone) * 3_600_000), lat, PLACE.lon_lat[0]).altitude);
+const dayOf = (lat: number, date: string, zone: number): Day =>
+  findDay((hour) => getPosition(new Date(Date.parse(`${date}T00:00Z`) + (hour - zone) * 3_600_000), lat, PLACE.lon_lat[0]).altitude);
 
 test("in Munich, the slider's day begins and ends at civil twilight, as an almanac has it", () => {
   const summer = dayOf(PLACE.lon_lat[1], "2026-06-21", 2);
   // dawn 4:33, sunrise 5:14, sunset 21:17, dusk 21:57
-  [summer.dawn - 4.55, (summer.sunrise ?? 99) - 5.23, (summer.sunset ?? 99) - 21.28, summer.dusk - 21.95].forEach((error) => { expect(Math.abs(error)).toBeLessThan(0.1); });
+  [summer.dawn - 4.55, (summer.sunrise ?? 99) - 5.23, (summer.sunset ?? 99) - 21.28, summer.dusk - 21.95].forEach((error) => {
+    expect(Math.abs(error)).toBeLessThan(0.1);
+  });
   const winter = dayOf(PLACE.lon_lat[1], "2026-12-21", 1);
   // sunrise 8:01, sunset 16:22
-  [(winter.sunrise ?? 99) - 8.02, (winter.sunset ?? 99) - 16.37].forEach((error) => { expect(Math.abs(error)).toBeLessThan(0.1); });
+  [(winter.sunrise ?? 99) - 8.02, (winter.sunset ?? 99) - 16.37].forEach((error) => {
+    expect(Math.abs(error)).toBeLessThan(0.1);
+  });
 });
 
 test("where the sun does not set, or does not rise, the day has all hours and no marks", () => {

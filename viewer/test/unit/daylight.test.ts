@@ -11,7 +11,8 @@ import { findShadow } from "../../src/geo/shadows";
 import { PLACE } from "../fixture/town";
 
 const { geographic, points } = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../spec/vectors/geographic.json"), "utf8")) as {
-  geographic: GeographicJson; points: { local: Vec2; lon_lat: Vec2; back: Vec2 }[];
+  geographic: GeographicJson;
+  points: { local: Vec2; lon_lat: Vec2; back: Vec2 }[];
 };
 
 describe("positions on earth", () => {
@@ -20,10 +21,17 @@ describe("positions on earth", () => {
     expect(((lon - lon_lat[0] + 540) % 360) - 180).toBeCloseTo(0, 10);
     expect(Math.abs(lon)).toBeLessThanOrEqual(180);
     expect(lat).toBeCloseTo(lon_lat[1], 10);
-    localFromLonLat(geographic, [lon, lat]).forEach((part, k) => { expect(part).toBeCloseTo(back[k as 0], 6); });
+    localFromLonLat(geographic, [lon, lat]).forEach((part, k) => {
+      expect(part).toBeCloseTo(back[k as 0], 6);
+    });
   });
 
-  test.each([[0, 358.086618], [90, 88.086618], [196.2, 194.286618], [275, 273.086618]])("an azimuth of %d° is reduced by the meridian convergence in UTM", (azimuth, expected) => {
+  test.each([
+    [0, 358.086618],
+    [90, 88.086618],
+    [196.2, 194.286618],
+    [275, 273.086618],
+  ])("an azimuth of %d° is reduced by the meridian convergence in UTM", (azimuth, expected) => {
     expect(localAzimuth(PLACE, PLACE.lon_lat, azimuth)).toBeCloseTo(expected, 3);
   });
 });
@@ -70,11 +78,23 @@ test("clocks show the user's time zone near home and solar time elsewhere", () =
 });
 
 describe("shadows that match a light", () => {
-  const sun = (azimuth_deg: number, altitude_deg: number): { time: null; azimuth_deg: number; elevation_deg: number; direction: Vec3 } => ({ time: null, azimuth_deg, elevation_deg: altitude_deg, direction: towardsLight({ azimuth_deg, altitude_deg }) });
-  const layer = (name: string, kind: string, suns: ReturnType<typeof sun>[]): LayerInfo => ({ name, kind, format: "png", media_type: "image/png", suns });
+  const sun = (azimuth_deg: number, altitude_deg: number): { time: null; azimuth_deg: number; elevation_deg: number; direction: Vec3 } => ({
+    time: null,
+    azimuth_deg,
+    elevation_deg: altitude_deg,
+    direction: towardsLight({ azimuth_deg, altitude_deg }),
+  });
+  const layer = (name: string, kind: string, suns: ReturnType<typeof sun>[]): LayerInfo => ({
+    name,
+    kind,
+    format: "png",
+    media_type: "image/png",
+    suns,
+  });
   const hours = layer("day", "sun16", [sun(90, 20), sun(110, 32), sun(135, 42), sun(165, 48)]);
   const noon = layer("noon", "sun", [sun(200, 50)]);
-  const at = (azimuth_deg: number, altitude_deg: number): ReturnType<typeof findShadow> => findShadow([hours, noon, layer("color", "color", [])], towardsLight({ azimuth_deg, altitude_deg }));
+  const at = (azimuth_deg: number, altitude_deg: number): ReturnType<typeof findShadow> =>
+    findShadow([hours, noon, layer("color", "color", [])], towardsLight({ azimuth_deg, altitude_deg }));
 
   test("a single sun if it is the light's", () => {
     expect(at(200, 50)).toMatchObject({ layer: noon, first: 0, second: 0, share: 0 });

@@ -9,11 +9,19 @@ import { RequestQueue } from "../../src/tiles/queue";
 import type { Source } from "../../src/tiles/source";
 
 const SIDE = 8;
-const QUARTERS: readonly Tile[] = [{ z: 3, x: 4, y: 6 }, { z: 3, x: 5, y: 6 }, { z: 3, x: 4, y: 7 }, { z: 3, x: 5, y: 7 }];
-const enlarge = (values: Uint8Array<ArrayBuffer>, tile: Tile): Uint8Array => enlargeQuarter({ kind: "ao", width: SIDE, height: SIDE, values }, tile).values;
+const QUARTERS: readonly Tile[] = [
+  { z: 3, x: 4, y: 6 },
+  { z: 3, x: 5, y: 6 },
+  { z: 3, x: 4, y: 7 },
+  { z: 3, x: 5, y: 7 },
+];
+const enlarge = (values: Uint8Array<ArrayBuffer>, tile: Tile): Uint8Array =>
+  enlargeQuarter({ kind: "ao", width: SIDE, height: SIDE, values }, tile).values;
 const enlargeBits = (rows: readonly string[], tile: Tile): string[] => {
   const values = Uint16Array.from(rows.join(""), (letter) => (letter === "#" ? 0x8001 : 0));
-  const found = [...enlargeQuarter({ kind: "sun16", width: SIDE, height: SIDE, values }, tile).values].map((value) => ({ 0x8001: "#", 0: "." })[value] ?? "?").join("");
+  const found = [...enlargeQuarter({ kind: "sun16", width: SIDE, height: SIDE, values }, tile).values]
+    .map((value) => ({ 0x8001: "#", 0: "." })[value] ?? "?")
+    .join("");
   return Array.from({ length: SIDE }, (_, row) => found.slice(row * SIDE, (row + 1) * SIDE));
 };
 const [TOP_LEFT, , , BOTTOM_RIGHT] = QUARTERS as [Tile, Tile, Tile, Tile];
@@ -23,7 +31,8 @@ describe("a quarter of a tile of light, enlarged", () => {
     const values = Uint8Array.from({ length: SIDE * SIDE }, (_, at) => (at * 89 + 7 * (at % 5)) % 256);
     const found = enlarge(values, tile);
     // The independent way: bilinear interpolation at the centre of the small pixel, edges repeated.
-    const at = (x: number, y: number): number => values[Math.min(Math.max(y, 0), SIDE - 1) * SIDE + Math.min(Math.max(x, 0), SIDE - 1)] ?? NaN;
+    const at = (x: number, y: number): number =>
+      values[Math.min(Math.max(y, 0), SIDE - 1) * SIDE + Math.min(Math.max(x, 0), SIDE - 1)] ?? NaN;
     for (let j = 0; j < SIDE; j++) {
       for (let i = 0; i < SIDE; i++) {
         const [u, v] = [(i + 0.5 + (tile.x - 4) * SIDE) / 2 - 0.5, (j + 0.5 + (tile.y - 6) * SIDE) / 2 - 0.5];
@@ -35,12 +44,18 @@ describe("a quarter of a tile of light, enlarged", () => {
   });
 
   test("keeps straight edges and thin lines", () => {
-    expect(enlargeBits(["##......", "##......", "........", "........", "........", "......#.", "......#.", "......#."], TOP_LEFT).slice(0, 3)).toEqual(["####....", "####....", "####...."]);
-    expect(enlargeBits(["........", "........", "........", "......#.", "......#.", "......#.", "......#.", "......#."], BOTTOM_RIGHT)).toEqual(new Array(SIDE).fill("....##.."));
+    expect(
+      enlargeBits(["##......", "##......", "........", "........", "........", "......#.", "......#.", "......#."], TOP_LEFT).slice(0, 3),
+    ).toEqual(["####....", "####....", "####...."]);
+    expect(
+      enlargeBits(["........", "........", "........", "......#.", "......#.", "......#.", "......#.", "......#."], BOTTOM_RIGHT),
+    ).toEqual(new Array(SIDE).fill("....##.."));
   });
 
   test("halves the steps of slanted edges", () => {
-    expect(enlargeBits(["#.......", "##......", "###.....", "####....", "#####...", "######..", "#######.", "########"], TOP_LEFT)).toEqual(["##......", "##......", "###.....", "####....", "#####...", "######..", "#######.", "########"]);
+    expect(enlargeBits(["#.......", "##......", "###.....", "####....", "#####...", "######..", "#######.", "########"], TOP_LEFT)).toEqual(
+      ["##......", "##......", "###.....", "####....", "#####...", "######..", "#######.", "########"],
+    );
   });
 });
 
@@ -51,20 +66,34 @@ const layerOf = (kind: string): LayerInfo => ({ name: kind, kind, format: "png",
 function open(): { tiles: LayerTiles; asked: string[]; decoded: string[] } {
   const [asked, decoded]: [string[], string[]] = [[], []];
   const name = ({ z, x, y }: Tile): string => [z, x, y].join("/");
-  const source = { tile: (_: unknown, { kind }: LayerInfo, tile: Tile) => { asked.push(`${kind} ${name(tile)}`); return Promise.resolve(new ArrayBuffer(9)); } } as unknown as Source;
+  const source = {
+    tile: (_: unknown, { kind }: LayerInfo, tile: Tile) => {
+      asked.push(`${kind} ${name(tile)}`);
+      return Promise.resolve(new ArrayBuffer(9));
+    },
+  } as unknown as Source;
   const decoder = {
     decode: (kind: string, _: string, bytes: ArrayBuffer, keep: boolean, below?: Tile) => {
       decoded.push(`${kind} ${String(bytes.byteLength)} ${String(keep)} ${below ? name(below) : ""}`);
       return Promise.resolve({ kind, width: 1, height: 1, values: new Uint8Array(1) });
     },
   } as unknown as Decoder;
-  const tiles = new LayerTiles("layer0", source, { cache: new Cache<CachedTile>(1e6, () => undefined), queue: new RequestQueue(12), decoder }, () => undefined);
+  const tiles = new LayerTiles(
+    "layer0",
+    source,
+    { cache: new Cache<CachedTile>(1e6, () => undefined), queue: new RequestQueue(12), decoder },
+    () => undefined,
+  );
   return { tiles, asked, decoded };
 }
 
 describe("on a dense screen", () => {
-  beforeEach(() => { vi.stubGlobal("devicePixelRatio", 3); });
-  afterEach(() => { vi.unstubAllGlobals(); });
+  beforeEach(() => {
+    vi.stubGlobal("devicePixelRatio", 3);
+  });
+  afterEach(() => {
+    vi.unstubAllGlobals();
+  });
 
   test("four tiles of light are made from the tile above, which is fetched once and kept for later", async () => {
     const { tiles, asked, decoded } = open();

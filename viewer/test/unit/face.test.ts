@@ -22,10 +22,17 @@ interface Spot {
 /** The sides of a box that are visible from some direction. */
 function facesOf([lo, hi]: Box3): Spot[] {
   const [w, l, h] = [hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]];
-  const wall = (x0: number, y0: number, x1: number, y1: number, area_m2: number): Spot => ({ area_m2, slope_deg: 90, at: (s, t) => [x0 + (x1 - x0) * s, y0 + (y1 - y0) * s, lo[2] + h * t] });
+  const wall = (x0: number, y0: number, x1: number, y1: number, area_m2: number): Spot => ({
+    area_m2,
+    slope_deg: 90,
+    at: (s, t) => [x0 + (x1 - x0) * s, y0 + (y1 - y0) * s, lo[2] + h * t],
+  });
   return [
     { area_m2: w * l, slope_deg: 0, at: (s, t) => [lo[0] + w * s, lo[1] + l * t, hi[2]] },
-    wall(lo[0], lo[1], hi[0], lo[1], w * h), wall(lo[0], hi[1], hi[0], hi[1], w * h), wall(lo[0], lo[1], lo[0], hi[1], l * h), wall(hi[0], lo[1], hi[0], hi[1], l * h),
+    wall(lo[0], lo[1], hi[0], lo[1], w * h),
+    wall(lo[0], hi[1], hi[0], hi[1], w * h),
+    wall(lo[0], lo[1], lo[0], hi[1], l * h),
+    wall(hi[0], lo[1], hi[0], hi[1], l * h),
   ];
 }
 
@@ -36,10 +43,12 @@ function frameAt(lookAt: number, pitch: number, tilePx = 256, px = PX): Frame {
 /** Finds what rays hit. */
 type Surface = (u: number, v: number) => { readonly id: number; readonly d: number } | null;
 
-const town = (frame: Frame): Surface => (u, v) => {
-  const hit = trace(frame, u, v);
-  return hit && { id: hit.id, d: frame.d0 + Math.round(hit.d * 1024) / 1024 };
-};
+const town =
+  (frame: Frame): Surface =>
+  (u, v) => {
+    const hit = trace(frame, u, v);
+    return hit && { id: hit.id, d: frame.d0 + Math.round(hit.d * 1024) / 1024 };
+  };
 
 /** A map that shows a surface, pixel by pixel; `asked`: the number of tiles requested from it. */
 function mapOf(frame: Frame, surface: Surface = town(frame), asked: number[] = []): map {
@@ -51,8 +60,13 @@ function mapOf(frame: Frame, surface: Surface = town(frame), asked: number[] = [
       while (z > 0 && tiles() > most) z--;
       asked.push(tiles());
       const px = pixelM(frame, z);
-      const at = (u: number, v: number): ReturnType<Surface> => surface(frame.u0 + (Math.floor((u - frame.u0) / px) + 0.5) * px, frame.v0 - (Math.floor((frame.v0 - v) / px) + 0.5) * px);
-      const relief = { pixel_m: px, idAt: (u: number, v: number) => at(u, v)?.id ?? 0, depthAt: (u: number, v: number) => at(u, v)?.d ?? Infinity };
+      const at = (u: number, v: number): ReturnType<Surface> =>
+        surface(frame.u0 + (Math.floor((u - frame.u0) / px) + 0.5) * px, frame.v0 - (Math.floor((frame.v0 - v) / px) + 0.5) * px);
+      const relief = {
+        pixel_m: px,
+        idAt: (u: number, v: number) => at(u, v)?.id ?? 0,
+        depthAt: (u: number, v: number) => at(u, v)?.d ?? Infinity,
+      };
       return Promise.resolve({ relief, approximate: z < frame.zmax });
     },
   } as unknown as map;
@@ -61,16 +75,25 @@ function mapOf(frame: Frame, surface: Surface = town(frame), asked: number[] = [
 /** Returns the positions on a face that rays reach. */
 function seenOf(frame: Frame, spot: Spot): Vec3[] {
   const shares = Array.from({ length: 30 }, (_, k) => (k + 0.5) / 30);
-  return shares.flatMap((s) => shares.map((t) => spot.at(s, t))).filter((local) => {
-    const [u, v, d] = uvdFromLocal(frame.axes, local);
-    return Math.abs(frame.d0 + (trace(frame, u, v)?.d ?? Infinity) - d) < 0.01;
-  });
+  return shares
+    .flatMap((s) => shares.map((t) => spot.at(s, t)))
+    .filter((local) => {
+      const [u, v, d] = uvdFromLocal(frame.axes, local);
+      return Math.abs(frame.d0 + (trace(frame, u, v)?.d ?? Infinity) - d) < 0.01;
+    });
 }
 
 const areaOf = (outline: Face["outline"]): number => outline.reduce((sum, loop) => sum + measureArea(loop).area_m2, 0);
 
 describe("faces of the town, by rays of every pixel", () => {
-  test.each([[0, 45], [30, 45], [45, 22.5], [180, 60], [120, 30], [90, 90]])("looking %d° at %d°: walls and roofs have the areas of the model, and hidden parts are reported", async (lookAt, pitch) => {
+  test.each([
+    [0, 45],
+    [30, 45],
+    [45, 22.5],
+    [180, 60],
+    [120, 30],
+    [90, 90],
+  ])("looking %d° at %d°: walls and roofs have the areas of the model, and hidden parts are reported", async (lookAt, pitch) => {
     const frame = frameAt(lookAt, pitch);
     const counts = { whole: 0, hidden: 0 };
     for (const spot of THINGS.slice(1).flatMap(({ box }) => facesOf(box))) {
@@ -130,7 +153,8 @@ describe("difficult faces", () => {
       for (const sign of [-1, 1]) {
         // Points (u, y, z) with z = 10 − |y|·rise and V = up·(y, z).
         const y = (v - up[2] * 10) / (up[1] - sign * up[2] * rise);
-        if (Math.sign(y) === sign && Math.abs(y) <= 8 && Math.abs(u) <= 10) return { id: 5, d: forward[1] * y + forward[2] * (10 - Math.abs(y) * rise) };
+        if (Math.sign(y) === sign && Math.abs(y) <= 8 && Math.abs(u) <= 10)
+          return { id: 5, d: forward[1] * y + forward[2] * (10 - Math.abs(y) * rise) };
       }
       return { id: 3, d: (v / up[1]) * forward[1] };
     };
@@ -167,10 +191,21 @@ describe("difficult faces", () => {
 test("loops: holes are separate and reversed, pixels that touch at a corner are separate", () => {
   const loops = (rows: readonly string[]): ReturnType<typeof loopsOf> => {
     const width = (rows[0] ?? "").length + 2;
-    return loopsOf(Uint8Array.from(["", ...rows, ""].map((row) => `.${row.padEnd(width - 2, ".")}.`).join(""), (sign) => (sign === "#" ? 1 : 0)), width);
+    return loopsOf(
+      Uint8Array.from(["", ...rows, ""].map((row) => `.${row.padEnd(width - 2, ".")}.`).join(""), (sign) => (sign === "#" ? 1 : 0)),
+      width,
+    );
   };
-  const turn = (loop: readonly Vec2[]): number => loop.reduce((sum, [x, y], k) => sum + x * (loop[(k + 1) % loop.length]?.[1] ?? 0) - (loop[(k + 1) % loop.length]?.[0] ?? 0) * y, 0) / 2;
-  expect(loops(["####", "####", "####"])).toEqual([[[1, 1], [5, 1], [5, 4], [1, 4]]]);
+  const turn = (loop: readonly Vec2[]): number =>
+    loop.reduce((sum, [x, y], k) => sum + x * (loop[(k + 1) % loop.length]?.[1] ?? 0) - (loop[(k + 1) % loop.length]?.[0] ?? 0) * y, 0) / 2;
+  expect(loops(["####", "####", "####"])).toEqual([
+    [
+      [1, 1],
+      [5, 1],
+      [5, 4],
+      [1, 4],
+    ],
+  ]);
   expect(loops(["#######", "#######", "##...##", "##...##", "##...##", "#######", "#######"]).map(turn)).toEqual([49, -9]);
   expect(loops(["##...", "##...", "..###", "..###", "..###"]).map(turn)).toEqual([4, 9]);
   expect(loops(["..##", "..##", "##..", "##.."]).map(turn)).toEqual([4, 4]);

@@ -33,25 +33,41 @@ test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, 
 
 test.each(["en", "de", "fr"])("%s: the captions of synchronized maps say what the compass says", (language) => {
   const { facing, winds } = getMapMessages(language);
-  for (const deg of [0, 44, 45, 90, 200, 270, 350, -90, 720]) expect(facing(winds[computeWind(deg)] ?? "").startsWith(describeDirection(deg, language))).toBe(true);
+  for (const deg of [0, 44, 45, 90, 200, 270, 350, -90, 720])
+    expect(facing(winds[computeWind(deg)] ?? "").startsWith(describeDirection(deg, language))).toBe(true);
 });
 
 test("winds count counter-clockwise", () => {
   const { winds } = getMapMessages("en");
-  expect([0, 45, 90, 179, 270, 340, -90, 720].map((deg) => winds[computeWind(deg)])).toEqual(["north", "north-west", "west", "south", "east", "north", "east", "north"]);
+  expect([0, 45, 90, 179, 270, 340, -90, 720].map((deg) => winds[computeWind(deg)])).toEqual([
+    "north",
+    "north-west",
+    "west",
+    "south",
+    "east",
+    "north",
+    "east",
+    "north",
+  ]);
 });
 
 /** All strings of the French tables of the viewer and the page, by file, without what is inserted into them. */
 function frenchTexts(): [file: string, text: string][] {
   const root = resolve(import.meta.dirname, "../..");
-  return ["src", "page"].flatMap((folder) => readdirSync(resolve(root, folder), { recursive: true, encoding: "utf8" }).filter((name) => name.endsWith(".ts")).flatMap((name) => {
-    const code = readFileSync(resolve(root, folder, name), "utf8");
-    const tables = [...code.matchAll(/^const FR\b[^]*?^\};|\bfr: .*/gm)].map(([table]) => table);
-    return tables.flatMap((table) => [...table.matchAll(/"([^"]*)"|`([^`]*)`/g)].map(([, quoted, template]): [string, string] => {
-      const text = (quoted ?? template ?? "").replace(/\$\{[^}]*\}/g, "x");
-      return [`${folder}/${name}`, text.replace(/\\u([0-9a-f]{4})/g, (_, code: string) => String.fromCharCode(parseInt(code, 16)))];
-    }));
-  }));
+  return ["src", "page"].flatMap((folder) =>
+    readdirSync(resolve(root, folder), { recursive: true, encoding: "utf8" })
+      .filter((name) => name.endsWith(".ts"))
+      .flatMap((name) => {
+        const code = readFileSync(resolve(root, folder, name), "utf8");
+        const tables = [...code.matchAll(/^const FR\b[^]*?^\};|\bfr: .*/gm)].map(([table]) => table);
+        return tables.flatMap((table) =>
+          [...table.matchAll(/"([^"]*)"|`([^`]*)`/g)].map(([, quoted, template]): [string, string] => {
+            const text = (quoted ?? template ?? "").replace(/\$\{[^}]*\}/g, "x");
+            return [`${folder}/${name}`, text.replace(/\\u([0-9a-f]{4})/g, (_, code: string) => String.fromCharCode(parseInt(code, 16)))];
+          }),
+        );
+      }),
+  );
 }
 
 test("in French, a narrow no-break space is before ; ! ? and a no-break space before :, so that no line begins with them", () => {

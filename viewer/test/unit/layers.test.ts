@@ -4,7 +4,13 @@ import { expect, test } from "vitest";
 import { DATA_KINDS, LIGHT_KINDS } from "../../src/geo/manifest";
 import { CHANNELS } from "../../src/tiles/tileData";
 
-interface Row { kind: string; array: { pixel: keyof typeof BYTES } | null; traced: boolean; unit_m: number | null; holds: string[] }
+interface Row {
+  kind: string;
+  array: { pixel: keyof typeof BYTES } | null;
+  traced: boolean;
+  unit_m: number | null;
+  holds: string[];
+}
 
 const rows = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../spec/layers.json"), "utf8")) as Row[];
 /** Bytes per pixel in a PNG, by the type of the array's pixels; 0 for pictures. */

@@ -22,7 +22,8 @@ describe("lines", () => {
 
 describe("areas", () => {
   test("of fewer than three corners are zero", () => {
-    for (const corners of [[], [at(0, 0, 0)], [at(0, 0, 0), at(4, 0, 0)]]) expect(measureArea(corners)).toMatchObject({ area_m2: 0, footprint_m2: 0, normal: [0, 0, 0] });
+    for (const corners of [[], [at(0, 0, 0)], [at(0, 0, 0), at(4, 0, 0)]])
+      expect(measureArea(corners)).toMatchObject({ area_m2: 0, footprint_m2: 0, normal: [0, 0, 0] });
     expect(measureArea([at(0, 0, 0), at(1, 0, 0), at(2, 0, 0)]).area_m2).toBe(0);
   });
 
@@ -47,10 +48,22 @@ describe("areas", () => {
 
 describe("formats", () => {
   const words = new MeasureMessages("en");
-  test.each([[0, "0.00 m"], [12.345, "12.35 m"], [99.996, "100.0 m"], [999.96, "1.00 km"], [1234.5, "1.23 km"], [12_345, "12.3 km"]])("%d m is %s", (metres, text) => {
+  test.each([
+    [0, "0.00 m"],
+    [12.345, "12.35 m"],
+    [99.996, "100.0 m"],
+    [999.96, "1.00 km"],
+    [1234.5, "1.23 km"],
+    [12_345, "12.3 km"],
+  ])("%d m is %s", (metres, text) => {
     expect(words.length(metres)).toBe(text);
   });
-  test.each([[3.456, "3.46 m²"], [123.45, "123.5 m²"], [1234, "1,234 m²"], [123_456, "12.35 ha"]])("%d m² is %s", (area, text) => {
+  test.each([
+    [3.456, "3.46 m²"],
+    [123.45, "123.5 m²"],
+    [1234, "1,234 m²"],
+    [123_456, "12.35 ha"],
+  ])("%d m² is %s", (area, text) => {
     expect(words.area(area)).toBe(text);
   });
   test("rise and fall in the user's number format", () => {

@@ -10,22 +10,49 @@ import { DEFAULTS } from "../../src/map/options";
 import { Viewport } from "../../src/map/viewport";
 import { marker } from "../../src/overlay/marker";
 
-const RENDERING = readManifest({
-  map3d: "rendering", version: 1, name: "town", title: "", attribution: "", content_version: 1, complete: true,
-  crs: { epsg: null, wkt: null, name: "local metres", vertical: null }, origin: [0, 0, 0], box: [[0, 0, 0], [100, 100, 10]],
-  tile_px: 256, zmax: 4, size_m: 1024, layers: [{ name: "color", kind: "color", format: "png", media_type: "image/png" }],
-  views: [{ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512, v0_m: 512, d0_m: -1000, occupancy: "AA==", version: 1, versions: {} }],
-}, "rendering.json");
+const RENDERING = readManifest(
+  {
+    map3d: "rendering",
+    version: 1,
+    name: "town",
+    title: "",
+    attribution: "",
+    content_version: 1,
+    complete: true,
+    crs: { epsg: null, wkt: null, name: "local metres", vertical: null },
+    origin: [0, 0, 0],
+    box: [
+      [0, 0, 0],
+      [100, 100, 10],
+    ],
+    tile_px: 256,
+    zmax: 4,
+    size_m: 1024,
+    layers: [{ name: "color", kind: "color", format: "png", media_type: "image/png" }],
+    views: [{ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512, v0_m: 512, d0_m: -1000, occupancy: "AA==", version: 1, versions: {} }],
+  },
+  "rendering.json",
+);
 
 /** A map's camera without a map. */
 class Controller extends CameraController {
   readonly options = { ...DEFAULTS, dataSaver: false };
   protected readonly size = { width: 800, height: 600, dpr: 1 };
-  protected requestFrame(): void { /* nothing is drawn */ }
-  report(error: Error): void { throw error; }
-  protected findCenterSurface(): Vec3 | null { return null; }
-  protected isCovered(): boolean { return true; }
-  findPosition(): Promise<Vec3> { return Promise.resolve([50, 50, 5]); }
+  protected requestFrame(): void {
+    /* nothing is drawn */
+  }
+  report(error: Error): void {
+    throw error;
+  }
+  protected findCenterSurface(): Vec3 | null {
+    return null;
+  }
+  protected isCovered(): boolean {
+    return true;
+  }
+  findPosition(): Promise<Vec3> {
+    return Promise.resolve([50, 50, 5]);
+  }
   start(): this {
     this.initializeView(RENDERING);
     return this;
@@ -38,7 +65,9 @@ class Controller extends CameraController {
 /** Calls with arguments that TypeScript would refuse, as JavaScript does. */
 type Loose = Record<string, (...given: unknown[]) => unknown>;
 
-afterEach(() => { vi.unstubAllGlobals(); });
+afterEach(() => {
+  vi.unstubAllGlobals();
+});
 
 describe("a camera", () => {
   const rows: [name: string, given: unknown[], message: RegExp][] = [
@@ -60,7 +89,16 @@ describe("a camera", () => {
     ["setZoom", [], /zoom: expected a number/],
     ["zoomBy", [NaN], /zoomBy: expected levels/],
     ["panBy", [1], /panBy: expected two numbers of CSS pixels/],
-    ["fitBounds", [[[0, 0, 0], [1, 1]]], /fitBounds: expected \[x, y, z\]/],
+    [
+      "fitBounds",
+      [
+        [
+          [0, 0, 0],
+          [1, 1],
+        ],
+      ],
+      /fitBounds: expected \[x, y, z\]/,
+    ],
     ["project", [[1, 2]], /project: expected \[x, y, z\]/],
     ["unproject", [[1, "2"]], /unproject: expected \[x, y\] in CSS pixels/],
     ["fromLonLat", [[11]], /fromLonLat: expected \[longitude, latitude\]/],
@@ -74,7 +112,9 @@ describe("a camera", () => {
     vi.stubGlobal("matchMedia", () => ({ matches: false }));
     const camera = new Controller().start();
     const before = camera.numbers;
-    expect(() => (camera as unknown as Loose)[name]?.(...given)).toThrow(expect.objectContaining({ name: "UsageError", message: expect.stringMatching(message) as string }));
+    expect(() => (camera as unknown as Loose)[name]?.(...given)).toThrow(
+      expect.objectContaining({ name: "UsageError", message: expect.stringMatching(message) as string }),
+    );
     expect(camera.numbers).toEqual(before);
     expect(before.every(Number.isFinite)).toBe(true);
   });
@@ -101,18 +141,27 @@ describe("markers and layers", () => {
     const pin = new marker("Town hall", [1, 2, 3]);
     expect(() => pin.setPosition([4, 5] as unknown as Vec3)).toThrow(UsageError);
     expect(pin.position).toEqual([1, 2, 3]);
-    expect(() => (pin as unknown as Loose)["on"]?.("mouseover", () => undefined)).toThrow('unknown event "mouseover"; use click, select, deselect, dragstart, drag, dragend');
+    expect(() => (pin as unknown as Loose)["on"]?.("mouseover", () => undefined)).toThrow(
+      'unknown event "mouseover"; use click, select, deselect, dragstart, drag, dragend',
+    );
     expect(pin.on("click", () => undefined)).toBe(pin);
   });
 
   test("a layer needs URLs, known options and known events", () => {
     vi.stubGlobal("document", { baseURI: "http://host/" });
-    const layer = (...given: unknown[]) => (): unknown => new (imageLayer as unknown as new (...args: unknown[]) => unknown)(...given);
+    const layer =
+      (...given: unknown[]) =>
+      (): unknown =>
+        new (imageLayer as unknown as new (...args: unknown[]) => unknown)(...given);
     for (const urls of [undefined, null, "", [], [undefined], 3]) expect(layer(urls)).toThrow(/needs at least one base URL/);
     expect(layer("town", { opactiy: 0.5 })).toThrow('unknown option "opactiy"; use mode, opacity, highlightColor, attribution, combine');
     expect(layer("town", { opacity: "0.5" })).toThrow('opacity: expected a number, got "0.5"');
-    expect(() => (new imageLayer("town") as unknown as Loose)["on"]?.("load", () => undefined)).toThrow('unknown event "load"; use ready, error, click, mouseover, mouseout, mousemove');
-    expect(() => new imageLayer("town").bindTooltip("a")).toThrow('bindTooltip needs the entry tooltip: load map3d-tooltip.js after map3d.js, or import "map3d/tooltip"');
+    expect(() => (new imageLayer("town") as unknown as Loose)["on"]?.("load", () => undefined)).toThrow(
+      'unknown event "load"; use ready, error, click, mouseover, mouseout, mousemove',
+    );
+    expect(() => new imageLayer("town").bindTooltip("a")).toThrow(
+      'bindTooltip needs the entry tooltip: load map3d-tooltip.js after map3d.js, or import "map3d/tooltip"',
+    );
     expect(() => new imageLayer("town").setOpacity(NaN)).toThrow(UsageError);
   });
 });
@@ -134,13 +183,29 @@ describe("a map", () => {
     readonly id = "town";
     readonly parentElement = null;
     readonly nodeType = 1;
-    setAttribute(): void { /* has none */ }
-    append(): void { /* has no content */ }
-    remove(): void { /* is in no page */ }
+    setAttribute(): void {
+      /* has none */
+    }
+    append(): void {
+      /* has no content */
+    }
+    remove(): void {
+      /* is in no page */
+    }
   }
   const stubPage = (): void => {
     vi.stubGlobal("HTMLCanvasElement", class extends FakeElement {});
-    vi.stubGlobal("ResizeObserver", class { observe(): void { /* sizes stay */ } disconnect(): void { /* as they were */ } });
+    vi.stubGlobal(
+      "ResizeObserver",
+      class {
+        observe(): void {
+          /* sizes stay */
+        }
+        disconnect(): void {
+          /* as they were */
+        }
+      },
+    );
     vi.stubGlobal("getComputedStyle", () => ({ position: "relative" }));
     vi.stubGlobal("window", { devicePixelRatio: 1 });
     vi.stubGlobal("document", { createElement: () => new FakeElement(), getElementById: () => null });
@@ -156,12 +221,21 @@ describe("a map", () => {
     expect(open(place).container).toBe(place);
   });
 
-  test.each([["nowhere", /no element has the id "nowhere"; pass a <canvas>/], [null, /not an element; pass a <canvas>/], [{}, /not an element; pass/]])("%j is no element", (target, message) => {
+  test.each([
+    ["nowhere", /no element has the id "nowhere"; pass a <canvas>/],
+    [null, /not an element; pass a <canvas>/],
+    [{}, /not an element; pass/],
+  ])("%j is no element", (target, message) => {
     stubPage();
     expect(() => open(target)).toThrow(message);
   });
 
-  test.each([[{ zom: 3 }, /unknown option "zom"; use controls, /], [{ center: [1, 2] }, /center: expected \[x, y, z\]/], [{ zoom: "3" }, /zoom: expected a number, got "3"/], [{ concurrency: NaN }, /concurrency: expected a number/]])("options %j are refused", (options, message) => {
+  test.each([
+    [{ zom: 3 }, /unknown option "zom"; use controls, /],
+    [{ center: [1, 2] }, /center: expected \[x, y, z\]/],
+    [{ zoom: "3" }, /zoom: expected a number, got "3"/],
+    [{ concurrency: NaN }, /concurrency: expected a number/],
+  ])("options %j are refused", (options, message) => {
     stubPage();
     expect(() => new map("canvas", options as object)).toThrow(message);
   });

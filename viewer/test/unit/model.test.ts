@@ -7,7 +7,10 @@ import { BOX, framesOf } from "../fixture/town";
 
 const frame = framesOf(BOX, 128, 0.38, [[0, 45]]).frames[0] as Camera["frame"];
 const CAMERA: Camera = { frame, u: 0, v: 0, zoom: 3, width: 500, height: 400 };
-const HOUSE: Box3 = [[-5, -5, 0], [5, 5, 10]];
+const HOUSE: Box3 = [
+  [-5, -5, 0],
+  [5, 5, 10],
+];
 
 describe("a part of the screen", () => {
   test.each([1, 1.5, 3])("contains the boxes at %d device pixels per CSS pixel", (dpr) => {
@@ -26,17 +29,52 @@ describe("a part of the screen", () => {
 
   test("is clipped to the screen, and null out of view", () => {
     const screen = { camera: CAMERA, width: 500, height: 400, dpr: 1 };
-    const all = screenRectOf([[[-1e4, -1e4, -1e4], [1e4, 1e4, 1e4]]], screen);
+    const all = screenRectOf(
+      [
+        [
+          [-1e4, -1e4, -1e4],
+          [1e4, 1e4, 1e4],
+        ],
+      ],
+      screen,
+    );
     expect(all).toEqual({ x: 0, y: 0, width: 500, height: 400 });
-    const edge = screenRectOf([[[90, -5, 0], [200, 5, 10]]], screen);
+    const edge = screenRectOf(
+      [
+        [
+          [90, -5, 0],
+          [200, 5, 10],
+        ],
+      ],
+      screen,
+    );
     expect(edge && edge.x + edge.width).toBe(500);
-    expect(screenRectOf([[[300, 0, 0], [310, 10, 10]]], screen)).toBe(null);
+    expect(
+      screenRectOf(
+        [
+          [
+            [300, 0, 0],
+            [310, 10, 10],
+          ],
+        ],
+        screen,
+      ),
+    ).toBe(null);
     expect(screenRectOf([], screen)).toBe(null);
   });
 
   test("keeps its size during small movements", () => {
     const sizes = [0, 1, 2.5].map((x) => {
-      const { width, height } = screenRectOf([[[x - 5, -5, 0], [x + 5, 5, 10]]], { camera: CAMERA, width: 500, height: 400, dpr: 1 }) ?? {};
+      const { width, height } =
+        screenRectOf(
+          [
+            [
+              [x - 5, -5, 0],
+              [x + 5, 5, 10],
+            ],
+          ],
+          { camera: CAMERA, width: 500, height: 400, dpr: 1 },
+        ) ?? {};
       return `${String(width)} ${String(height)}`;
     });
     expect(new Set(sizes).size).toBe(1);
@@ -53,6 +91,12 @@ test("the depth range of boxes is that of their corners", () => {
 
 test("three.js lights are π times the map's light; unlit, uniform white", () => {
   const lamps = threeLighting({ ...DEFAULT_LIGHT, sun_rgb: [1, 0.5, 0.2] });
-  expect(lamps).toEqual({ sky_rgb: [1, 1, 1], sky: Math.PI * 0.42, sun_rgb: [1, 0.5, 0.2], sun: Math.PI * 0.76, towards: towardsLight(DEFAULT_LIGHT) });
+  expect(lamps).toEqual({
+    sky_rgb: [1, 1, 1],
+    sky: Math.PI * 0.42,
+    sun_rgb: [1, 0.5, 0.2],
+    sun: Math.PI * 0.76,
+    towards: towardsLight(DEFAULT_LIGHT),
+  });
   expect(threeLighting({ ...DEFAULT_LIGHT, sky_rgb: [0, 0, 1], lit: false })).toMatchObject({ sky_rgb: [1, 1, 1], sky: Math.PI, sun: 0 });
 });

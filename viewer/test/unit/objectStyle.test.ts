@@ -11,7 +11,18 @@ describe("an object style", () => {
     ["only dims the others", { only: [5, 6] }, { 5: "plain", 6: "plain" }, "dimmed"],
     ["or hides them", { only: [5], others: "hidden" }, { 5: "plain" }, "hidden"],
     ["only none dims all", { only: [] }, {}, "dimmed"],
-    ["colours hold for those that are shown", { colors: new Map([[5, "#ff0000"], [6, "#ff0000"]]), only: [5] }, { 5: RED }, "dimmed"],
+    [
+      "colours hold for those that are shown",
+      {
+        colors: new Map([
+          [5, "#ff0000"],
+          [6, "#ff0000"],
+        ]),
+        only: [5],
+      },
+      { 5: RED },
+      "dimmed",
+    ],
     ["what is hidden is hidden", { colors: new Map([[5, "#ff0000"]]), only: [5], hidden: [5, 7] }, { 5: "hidden", 7: "hidden" }, "dimmed"],
     ["large ids are themselves", { hidden: [3_900_000_007] }, { 3_900_000_007: "hidden" }, "plain"],
   ];
@@ -21,7 +32,11 @@ describe("an object style", () => {
     expect(Object.fromEntries(found?.byId ?? [])).toEqual(byId);
   });
 
-  const below = new Map([[5, [6, 7, 8]], [6, [8]], [9, []]]);
+  const below = new Map([
+    [5, [6, 7, 8]],
+    [6, [8]],
+    [9, []],
+  ]);
   test.each([
     ["descendants have the style of the object above", { colors: new Map([[5, "#ff0000"]]) }, { 5: RED, 6: RED, 7: RED, 8: RED }],
     ["that of the nearest one", { colors: new Map([[5, "#ff0000"]]), hidden: [6] }, { 5: RED, 6: "hidden", 7: RED, 8: "hidden" }],
@@ -54,7 +69,7 @@ test("packed styles are distinct and never 0", () => {
 });
 
 test("every id of a table is found within the longest search", () => {
-  const ids = Array.from({ length: 5000 }, (_, k) => (Math.imul(k + 1, 0x85ebca6b) >>> 0) || 1);
+  const ids = Array.from({ length: 5000 }, (_, k) => Math.imul(k + 1, 0x85ebca6b) >>> 0 || 1);
   const table = buildIdTable(new Map(ids.map((id, k) => [id, k + 1])), (word) => word);
   ids.forEach((id, k) => {
     let place = (Math.imul(id, 0x9e3779b9) >>> 7) & table.mask;

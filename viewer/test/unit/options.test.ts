@@ -8,7 +8,12 @@ const FILES = readdirSync(SRC, { recursive: true, encoding: "utf8" }).filter((na
 /** Lists the optional fields of the option types of a file, with their comments. */
 function listOptions(text: string): { name: string; comment: string }[] {
   const types = [...text.matchAll(/^export interface (\w*Options)\b[^{]*\{\n(.*?)^\}/gms)];
-  return types.flatMap(([, type = "", body = ""]) => [...body.matchAll(/(?:\/\*\*((?:(?!\*\/).)*)\*\/\s*)?^ {2}(?:readonly )?(\w+)\?:/gms)].map(([, comment = "", name = ""]) => ({ name: `${type}.${name}`, comment })));
+  return types.flatMap(([, type = "", body = ""]) =>
+    [...body.matchAll(/(?:\/\*\*((?:(?!\*\/).)*)\*\/\s*)?^ {2}(?:readonly )?(\w+)\?:/gms)].map(([, comment = "", name = ""]) => ({
+      name: `${type}.${name}`,
+      comment,
+    })),
+  );
 }
 
 const OPTIONS = FILES.flatMap((file) => listOptions(readFileSync(join(SRC, file), "utf8")));

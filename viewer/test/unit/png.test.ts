@@ -40,7 +40,12 @@ describe("PNG", () => {
       head.write("IDAT", 4);
       return Buffer.concat([head, bytes, Buffer.alloc(4)]);
     };
-    const split = Buffer.concat([whole.subarray(0, at), part(body.subarray(0, 5)), part(body.subarray(5)), whole.subarray(at + 12 + length)]);
+    const split = Buffer.concat([
+      whole.subarray(0, at),
+      part(body.subarray(0, 5)),
+      part(body.subarray(5)),
+      whole.subarray(at + 12 + length),
+    ]);
     expect([...(await decodePng(new Uint8Array(split))).data]).toEqual([...noise(768, 3)]);
   });
 });
@@ -81,7 +86,10 @@ describe("an unsupported PNG is refused", () => {
 });
 
 describe("data", () => {
-  const file = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../spec/vectors/data.json"), "utf8")) as { uint32: { value: number; rgba: number[] }[]; normal: { rgb: number[] }[] };
+  const file = JSON.parse(readFileSync(resolve(import.meta.dirname, "../../../spec/vectors/data.json"), "utf8")) as {
+    uint32: { value: number; rgba: number[] }[];
+    normal: { rgb: number[] }[];
+  };
 
   test.each(["id", "depth"])("%s values match the vectors", async (kind) => {
     const bytes = Uint8Array.from(file.uint32.flatMap(({ rgba }) => rgba));
@@ -102,6 +110,8 @@ describe("data", () => {
   });
 
   test("an id tile without alpha is refused", async () => {
-    await expect(decodeTile("id", "image/png", encodePng(1, 1, 3, new Uint8Array(3)).buffer)).rejects.toThrow(/id tiles have 4 bytes per pixel, got 3/);
+    await expect(decodeTile("id", "image/png", encodePng(1, 1, 3, new Uint8Array(3)).buffer)).rejects.toThrow(
+      /id tiles have 4 bytes per pixel, got 3/,
+    );
   });
 });

@@ -7,7 +7,13 @@ import type { LayerKind, View } from "../../src/map3d";
 import { epsgOf, isNorthFirst, isSameSystem } from "../../src/portrayal/axisOrder";
 import type { Capabilities, ProjectionParameter } from "../../src/portrayal/capabilities";
 import { makeViews, parseViewId, placeCamera } from "../../src/portrayal/grid";
-import { checkImageOptions, chooseAdditionalImages, chooseImages, describeLayers, type RequestedImage } from "../../src/portrayal/imageFormats";
+import {
+  checkImageOptions,
+  chooseAdditionalImages,
+  chooseImages,
+  describeLayers,
+  type RequestedImage,
+} from "../../src/portrayal/imageFormats";
 import type { PortrayalOptions } from "../../src/portrayal/options";
 import { formatNumber, objectUrl, viewUrl, withQuery, type ViewTemplate } from "../../src/portrayal/requestUrls";
 import { BOX, CAMERA, COLOR, NORMAL, TEMPLATE } from "../fixture/portrayalRequest";
@@ -19,22 +25,56 @@ const ORIGIN: Vec3 = [691000, 5336000, 500];
 
 // From the EPSG register, by pyproj: axis_info of each system.
 test.each([
-  [25832, false], [32633, false], [2056, false], [28992, false], [3857, false], [5514, false],
-  [31466, true], [31467, true], [31468, true], [31469, true], [3034, true], [3035, true], [3006, true], [2180, true], [2326, true], [2393, true], [2443, true], [6677, true],
-  [3067, false], [5555, false], [2100, false], [31470, false], [31465, false], [1, false], [999_999, false],
+  [25832, false],
+  [32633, false],
+  [2056, false],
+  [28992, false],
+  [3857, false],
+  [5514, false],
+  [31466, true],
+  [31467, true],
+  [31468, true],
+  [31469, true],
+  [3034, true],
+  [3035, true],
+  [3006, true],
+  [2180, true],
+  [2326, true],
+  [2393, true],
+  [2443, true],
+  [6677, true],
+  [3067, false],
+  [5555, false],
+  [2100, false],
+  [31470, false],
+  [31465, false],
+  [1, false],
+  [999_999, false],
 ])("EPSG:%i has the northing first: %s", (epsg, expected) => {
   expect(isNorthFirst(epsg)).toBe(expected);
 });
 
 test.each([
-  ["EPSG:25832", 25832], ["epsg:31467", 31467], ["urn:ogc:def:crs:EPSG::31468", 31468], ["urn:ogc:def:crs:EPSG:9.9.1:3035", 3035], ["http://www.opengis.net/def/crs/EPSG/0/25833", 25833],
-  ["http://www.opengis.net/gml/srs/epsg.xml#4326", 4326], ["EPSG:25832+7837", 25832], ["urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::7837", 25832], ["CRS:84", null], ["urn:map3d:def:crs:local:town", null],
+  ["EPSG:25832", 25832],
+  ["epsg:31467", 31467],
+  ["urn:ogc:def:crs:EPSG::31468", 31468],
+  ["urn:ogc:def:crs:EPSG:9.9.1:3035", 3035],
+  ["http://www.opengis.net/def/crs/EPSG/0/25833", 25833],
+  ["http://www.opengis.net/gml/srs/epsg.xml#4326", 4326],
+  ["EPSG:25832+7837", 25832],
+  ["urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::7837", 25832],
+  ["CRS:84", null],
+  ["urn:map3d:def:crs:local:town", null],
 ])("the code of %s is %s", (name, code) => {
   expect(epsgOf(name)).toBe(code);
   expect(isSameSystem(name, code === null ? name : `EPSG:${String(code)}`)).toBe(true);
 });
 
-test.each([["45-22.5", [45, 22.5]], ["0-90", [0, 90]], ["359.5-1", [359.5, 1]]])("view %s", (id, expected) => {
+test.each([
+  ["45-22.5", [45, 22.5]],
+  ["0-90", [0, 90]],
+  ["359.5-1", [359.5, 1]],
+])("view %s", (id, expected) => {
   expect(parseViewId(id)).toEqual(expected);
 });
 
@@ -57,12 +97,21 @@ test("a tile is occupied exactly if the projection of the box meets it", () => {
     }
     for (let y = -1; y <= 2 ** zmax; y++) {
       for (let x = -1; x <= 2 ** zmax; x++) {
-        if (inside.has(`${String(x)}/${String(y)}`)) expect(occupancy.has({ z: zmax, x, y }), `${frame.id} ${String(x)}/${String(y)}`).toBe(true);
+        if (inside.has(`${String(x)}/${String(y)}`))
+          expect(occupancy.has({ z: zmax, x, y }), `${frame.id} ${String(x)}/${String(y)}`).toBe(true);
       }
     }
-    const count = Array.from({ length: 4 ** zmax }, (_, k) => occupancy.has({ z: zmax, x: k % 2 ** zmax, y: Math.floor(k / 2 ** zmax) })).filter(Boolean).length;
+    const count = Array.from({ length: 4 ** zmax }, (_, k) =>
+      occupancy.has({ z: zmax, x: k % 2 ** zmax, y: Math.floor(k / 2 ** zmax) }),
+    ).filter(Boolean).length;
     expect(count).toBeLessThan(1.25 * inside.size + 12);
-    for (const tile of [{ z: -1, x: 0, y: 0 }, { z: zmax + 1, x: 0, y: 0 }, { z: 1, x: 2, y: 0 }, { z: 1, x: 0, y: -1 }] as Tile[]) expect(occupancy.has(tile)).toBe(false);
+    for (const tile of [
+      { z: -1, x: 0, y: 0 },
+      { z: zmax + 1, x: 0, y: 0 },
+      { z: 1, x: 2, y: 0 },
+      { z: 1, x: 0, y: -1 },
+    ] as Tile[])
+      expect(occupancy.has(tile)).toBe(false);
     expect(occupancy.has({ z: 0, x: 0, y: 0 })).toBe(true);
   }
 });
@@ -70,7 +119,14 @@ test("a tile is occupied exactly if the projection of the box meets it", () => {
 /** Points of a unit cube's surface. */
 function* surface(steps: readonly number[]): Generator<Vec3> {
   const ends = [steps[0] as number, steps.at(-1) as number];
-  for (const a of steps) for (const b of steps) for (const end of ends) yield* [[a, b, end], [a, end, b], [end, a, b]] as Vec3[];
+  for (const a of steps)
+    for (const b of steps)
+      for (const end of ends)
+        yield* [
+          [a, b, end],
+          [a, end, b],
+          [end, a, b],
+        ] as Vec3[];
 }
 
 test("the square of each view holds the box, and its depths begin in front of it", () => {
@@ -92,22 +148,59 @@ test("the camera of a tile looks along the view, at its middle", () => {
   const local = position.map((value, k) => value - (ORIGIN[k] as number)) as unknown as Vec3;
   const axes = computeAxes(30, 40);
   expect(half_m).toBeCloseTo((pixelM(view.frame, 1) * 256) / 2, 9);
-  expect(local).toEqual(localFromUvd(axes, [view.frame.u0 + 3 * half_m, view.frame.v0 - half_m, view.frame.d0]).map((value) => expect.closeTo(value, 6) as number));
-  expect(target.map((value, k) => (value - (position[k] as number)) / 1000)).toEqual(axes.forward.map((value) => expect.closeTo(value, 9) as number));
+  expect(local).toEqual(
+    localFromUvd(axes, [view.frame.u0 + 3 * half_m, view.frame.v0 - half_m, view.frame.d0]).map(
+      (value) => expect.closeTo(value, 6) as number,
+    ),
+  );
+  expect(target.map((value, k) => (value - (position[k] as number)) / 1000)).toEqual(
+    axes.forward.map((value) => expect.closeTo(value, 9) as number),
+  );
   expect(far_m).toBeGreaterThan(Math.max(...corners(BOX).map((corner) => uvdFromLocal(axes, corner)[2])) - view.frame.d0);
 });
 
-const named = (...names: string[]): ProjectionParameter[] => names.map((name) => ({ name: name.replace("?", ""), required: !name.endsWith("?") }));
+const named = (...names: string[]): ProjectionParameter[] =>
+  names.map((name) => ({ name: name.replace("?", ""), required: !name.endsWith("?") }));
 
 test.each<[string, Partial<ViewTemplate>, object, string]>([
   ["the standard's order", {}, {}, "1,2,3,4,5,-6.5,,,,-12.8,12.8,-12.8,12.8,1,2000"],
   ["northings first", { northFirst: true }, {}, "2,1,3,5,4,-6.5,,,,-12.8,12.8,-12.8,12.8,1,2000"],
-  ["one number per parameter", { projection: named("pocx1", "pocx2", "pocx3", "poix1", "poix2", "poix3", "upx1?", "upx2?", "upx3?", "left?", "right?", "bottom?", "top?", "nearplane?", "farplane?") }, {}, "1,2,3,4,5,-6.5,,,,-12.8,12.8,-12.8,12.8,1,2000"],
-  ["another order, UP required", { projection: named("up", "farplane", "roll?", "top", "bottom", "right", "left", "poi", "poc") }, {}, "0,0,1,2000,,12.8,-12.8,12.8,-12.8,4,5,-6.5,1,2,3"],
+  [
+    "one number per parameter",
+    {
+      projection: named(
+        "pocx1",
+        "pocx2",
+        "pocx3",
+        "poix1",
+        "poix2",
+        "poix3",
+        "upx1?",
+        "upx2?",
+        "upx3?",
+        "left?",
+        "right?",
+        "bottom?",
+        "top?",
+        "nearplane?",
+        "farplane?",
+      ),
+    },
+    {},
+    "1,2,3,4,5,-6.5,,,,-12.8,12.8,-12.8,12.8,1,2000",
+  ],
+  [
+    "another order, UP required",
+    { projection: named("up", "farplane", "roll?", "top", "bottom", "right", "left", "poi", "poc") },
+    {},
+    "0,0,1,2000,,12.8,-12.8,12.8,-12.8,4,5,-6.5,1,2,3",
+  ],
   ["straight down", { northFirst: true }, { straightDown: true }, "2,1,3,5,4,-6.5,0.5,0,0.5,-12.8,12.8,-12.8,12.8,1,2000"],
 ])("GetView: %s", (_, template, camera, expected) => {
   const url = viewUrl({ ...TEMPLATE, ...template }, { ...CAMERA, ...camera }, [COLOR, NORMAL]);
-  expect(url).toBe(`https://example.org/3dps?service=3DPS&request=GetView&version=1.0&crs=EPSG%3A25832&layers=town&transparentBackground=true&portrayals=WIDTH=256;HEIGHT=256;PROJECTION=Orthographic,${expected};IMAGELAYERS=COLOR,NORMAL;FORMATS=image%2Fpng%3Bmode%3D32bit,image%2Fpng`);
+  expect(url).toBe(
+    `https://example.org/3dps?service=3DPS&request=GetView&version=1.0&crs=EPSG%3A25832&layers=town&transparentBackground=true&portrayals=WIDTH=256;HEIGHT=256;PROJECTION=Orthographic,${expected};IMAGELAYERS=COLOR,NORMAL;FORMATS=image%2Fpng%3Bmode%3D32bit,image%2Fpng`,
+  );
 });
 
 test.each<[string, readonly RequestedImage[], Partial<ViewTemplate>, string, string]>([
@@ -124,38 +217,87 @@ test.each<[string, readonly RequestedImage[], Partial<ViewTemplate>, string, str
 });
 
 test("a required parameter that is not known is refused", () => {
-  expect(() => viewUrl({ ...TEMPLATE, projection: named("poc", "poi", "shear") }, CAMERA, [COLOR])).toThrow(/requires the parameter "shear"/);
+  expect(() => viewUrl({ ...TEMPLATE, projection: named("poc", "poi", "shear") }, CAMERA, [COLOR])).toThrow(
+    /requires the parameter "shear"/,
+  );
 });
 
 test.each([
-  [0, "0"], [-0, "0"], [100, "100"], [1e-10, "0"], [-1e-10, "0"], [0.1 + 0.2, "0.3"], [5336000.123456789, "5336000.123456789"], [-12.5, "-12.5"], [1e21 / 1e5, "10000000000000000"],
+  [0, "0"],
+  [-0, "0"],
+  [100, "100"],
+  [1e-10, "0"],
+  [-1e-10, "0"],
+  [0.1 + 0.2, "0.3"],
+  [5336000.123456789, "5336000.123456789"],
+  [-12.5, "-12.5"],
+  [1e21 / 1e5, "10000000000000000"],
 ])("%d is written as %s", (value, expected) => {
   expect(formatNumber(value)).toBe(expected);
 });
 
-test.each([["https://h/x", "https://h/x?a"], ["https://h/x?", "https://h/x?a"], ["https://h/x?map=1", "https://h/x?map=1&a"], ["https://h/x?map=1&", "https://h/x?map=1&a"], ["https://h/x#y", "https://h/x?a"]])("parameters of %s", (base, expected) => {
+test.each([
+  ["https://h/x", "https://h/x?a"],
+  ["https://h/x?", "https://h/x?a"],
+  ["https://h/x?map=1", "https://h/x?map=1&a"],
+  ["https://h/x?map=1&", "https://h/x?map=1&a"],
+  ["https://h/x#y", "https://h/x?a"],
+])("parameters of %s", (base, expected) => {
   expect(withQuery(base, "a")).toBe(expected);
 });
 
 test("names are encoded one by one", () => {
-  expect(viewUrl({ ...TEMPLATE, layers: ["a,b", "c&d=ü"], styles: ["", "x;y"] }, CAMERA, [NORMAL])).toContain("&layers=a%2Cb,c%26d%3D%C3%BC&styles=,x%3By&portrayals=");
-  expect(objectUrl("https://h/?", ["a,b"], 7, "text/xml")).toBe("https://h/?service=3DPS&request=GetFeatureInfoByObjectId&version=1.0&layers=a%2Cb&objectId=7&format=text%2Fxml");
+  expect(viewUrl({ ...TEMPLATE, layers: ["a,b", "c&d=ü"], styles: ["", "x;y"] }, CAMERA, [NORMAL])).toContain(
+    "&layers=a%2Cb,c%26d%3D%C3%BC&styles=,x%3By&portrayals=",
+  );
+  expect(objectUrl("https://h/?", ["a,b"], 7, "text/xml")).toBe(
+    "https://h/?service=3DPS&request=GetFeatureInfoByObjectId&version=1.0&layers=a%2Cb&objectId=7&format=text%2Fxml",
+  );
 });
 
-const offered = (layers: Record<string, string[]>): Capabilities => ({ provider: "", operations: new Map(), layers: [], orthographic: null, multipart: true, imageLayers: new Map(Object.entries(layers).map(([name, formats]) => [name, { identifier: name, formats }])) });
-const chosen = (images: ReadonlyMap<LayerKind, RequestedImage>): object => Object.fromEntries([...images].map(([kind, { format }]) => [kind, format]));
+const offered = (layers: Record<string, string[]>): Capabilities => ({
+  provider: "",
+  operations: new Map(),
+  layers: [],
+  orthographic: null,
+  multipart: true,
+  imageLayers: new Map(Object.entries(layers).map(([name, formats]) => [name, { identifier: name, formats }])),
+});
+const chosen = (images: ReadonlyMap<LayerKind, RequestedImage>): object =>
+  Object.fromEntries([...images].map(([kind, { format }]) => [kind, format]));
 
 test("formats: exact ones first, and none that would mix data", () => {
-  expect(chosen(chooseImages(offered({ COLOR: ["image/jpeg", "image/png", "image/png;mode=32bit"], NORMAL: ["image/jpeg", "image/png"], OBJECTID: ["image/png;Mode=32Bit"], DEPTH: ["image/png;mode=24bit"] })))).toEqual({ color: "image/png;mode=32bit", normal: "image/png", id: "image/png;Mode=32Bit" });
+  expect(
+    chosen(
+      chooseImages(
+        offered({
+          COLOR: ["image/jpeg", "image/png", "image/png;mode=32bit"],
+          NORMAL: ["image/jpeg", "image/png"],
+          OBJECTID: ["image/png;Mode=32Bit"],
+          DEPTH: ["image/png;mode=24bit"],
+        }),
+      ),
+    ),
+  ).toEqual({ color: "image/png;mode=32bit", normal: "image/png", id: "image/png;Mode=32Bit" });
   expect(chosen(chooseImages(offered({ COLOR: ["image/jpeg"], NORMAL: ["image/jpeg"] })))).toEqual({ color: "image/jpeg" });
   expect(chosen(chooseImages(offered({ COLOR: ["image/png", "image/webp"] }), "image/webp"))).toEqual({ color: "image/webp" });
   expect(chooseImages(offered({ COLOR: ["image/png"] }), "image/webp").size).toBe(0);
   const jpeg = { kind: "color", identifier: "COLOR", format: "image/jpg", mediaType: "image/jpeg" } as const;
   expect(describeLayers(new Map([["color", jpeg]]))[0]?.format).toBe("opaque");
-  expect(describeLayers(new Map<LayerKind, RequestedImage>([["color", jpeg], ["id", { ...NORMAL, kind: "id" }]]))[0]?.format).toBe("jpeg");
+  expect(
+    describeLayers(
+      new Map<LayerKind, RequestedImage>([
+        ["color", jpeg],
+        ["id", { ...NORMAL, kind: "id" }],
+      ]),
+    )[0]?.format,
+  ).toBe("jpeg");
 });
 
-const withSunParameter = (layers: Record<string, string[]>, ...parameters: string[]): Capabilities => ({ ...offered(layers), operations: new Map([["GetView", { url: null, formats: [], parameters: new Set(parameters) }]]) });
+const withSunParameter = (layers: Record<string, string[]>, ...parameters: string[]): Capabilities => ({
+  ...offered(layers),
+  operations: new Map([["GetView", { url: null, formats: [], parameters: new Set(parameters) }]]),
+});
 const sun = { azimuth_deg: 135, altitude_deg: 45 };
 
 test("additional images are those that the options ask for", () => {
@@ -163,17 +305,37 @@ test("additional images are those that the options ask for", () => {
   expect(chooseAdditionalImages(full, {}, "x")).toEqual([]);
   expect(chooseAdditionalImages(full, { occlusion: true }, "x")).toEqual([AO]);
   expect(chooseAdditionalImages(full, { occlusion: true, sun }, "x")).toEqual([AO, SUN]);
-  const [ao, shadow] = describeLayers(new Map<LayerKind, RequestedImage>([["ao", AO], ["sun", SUN]]), sun);
+  const [ao, shadow] = describeLayers(
+    new Map<LayerKind, RequestedImage>([
+      ["ao", AO],
+      ["sun", SUN],
+    ]),
+    sun,
+  );
   expect(ao).toEqual({ name: "ao", kind: "ao", format: "png", media_type: "image/png" });
   // In the south-east, half-way up.
-  expect(shadow?.suns?.map(({ direction }) => direction)).toEqual([[0.5, -0.5, Math.SQRT1_2].map((value) => expect.closeTo(value, 12) as number)]);
+  expect(shadow?.suns?.map(({ direction }) => direction)).toEqual([
+    [0.5, -0.5, Math.SQRT1_2].map((value) => expect.closeTo(value, 12) as number),
+  ]);
 });
 
 test.each<[string, PortrayalOptions, Record<string, string[]>, string[], RegExp]>([
-  ["no AO", { occlusion: true }, { COLOR: ["image/png"], SUN: ["image/png"] }, ["sun"], /^occlusion: https:\/\/h does not advertise the image layer AO; it has COLOR, SUN$/],
+  [
+    "no AO",
+    { occlusion: true },
+    { COLOR: ["image/png"], SUN: ["image/png"] },
+    ["sun"],
+    /^occlusion: https:\/\/h does not advertise the image layer AO; it has COLOR, SUN$/,
+  ],
   ["AO with losses only", { occlusion: true }, { AO: ["image/jpeg"] }, [], /^occlusion: .* AO as image\/png; it has image\/jpeg$/],
   ["no SUN", { sun }, { COLOR: ["image/png"], AO: ["image/png"] }, ["sun"], /^sun: .* the image layer SUN; it has COLOR, AO$/],
-  ["a sun that cannot be chosen", { sun }, { SUN: ["image/png"] }, ["portrayals"], /^sun: the GetView of https:\/\/h does not advertise the parameter SUN/],
+  [
+    "a sun that cannot be chosen",
+    { sun },
+    { SUN: ["image/png"] },
+    ["portrayals"],
+    /^sun: the GetView of https:\/\/h does not advertise the parameter SUN/,
+  ],
 ])("what a service does not advertise is refused: %s", (_, options, layers, parameters, words) => {
   expect(() => chooseAdditionalImages(withSunParameter(layers, ...parameters), options, "https://h")).toThrow(words);
 });
@@ -187,9 +349,19 @@ test.each<[PortrayalOptions, RegExp]>([
   [{ sun: { azimuth_deg: 0, altitude_deg: 0 } }, /altitude_deg above 0 and up to 90, got 0 and 0/],
   [{ sun: { azimuth_deg: 0, altitude_deg: NaN } }, /got 0 and NaN/],
 ])("options of images are checked: %j", (options, words) => {
-  expect(() => { checkImageOptions(options); }).toThrow(words);
+  expect(() => {
+    checkImageOptions(options);
+  }).toThrow(words);
 });
 
-test.each<PortrayalOptions>([{}, { colorQuality: 0, colorFormat: "image/webp" }, { colorQuality: 100, colorFormat: "Image/JPEG" }, { colorQuality: 7, colorFormat: "image/jpg" }, { sun: { azimuth_deg: 360, altitude_deg: 90 }, occlusion: false }])("valid options of images: %j", (options) => {
-  expect(() => { checkImageOptions(options); }).not.toThrow();
+test.each<PortrayalOptions>([
+  {},
+  { colorQuality: 0, colorFormat: "image/webp" },
+  { colorQuality: 100, colorFormat: "Image/JPEG" },
+  { colorQuality: 7, colorFormat: "image/jpg" },
+  { sun: { azimuth_deg: 360, altitude_deg: 90 }, occlusion: false },
+])("valid options of images: %j", (options) => {
+  expect(() => {
+    checkImageOptions(options);
+  }).not.toThrow();
 });

@@ -16,29 +16,69 @@ const bytesOf = (text: string): ArrayBuffer => Uint8Array.from({ length: text.le
 const LAYER = { identifier: "a", title: "", styles: [], queryable: false, renderings: [], lonLatBox: null };
 
 test("the system of a layer: projected, with a box, axes by its code", () => {
-  const boxes = [{ crs: "EPSG:4326", low: [48, 11, 500], high: [48.1, 11.1, 600] }, { crs: "EPSG:31467", low: [5_336_000, 3_500_000, 500], high: [5_336_100, 3_500_200, 600] }];
+  const boxes = [
+    { crs: "EPSG:4326", low: [48, 11, 500], high: [48.1, 11.1, 600] },
+    { crs: "EPSG:31467", low: [5_336_000, 3_500_000, 500], high: [5_336_100, 3_500_200, 600] },
+  ];
   const layer = { ...LAYER, crs: ["EPSG:4326", "EPSG:25832", "urn:ogc:def:crs:EPSG::31467"], boxes };
-  const expected = { crs: "urn:ogc:def:crs:EPSG::31467", epsg: 31467, northFirst: true, box: [[3_500_000, 5_336_000, 500], [3_500_200, 5_336_100, 600]] };
+  const expected = {
+    crs: "urn:ogc:def:crs:EPSG::31467",
+    epsg: 31467,
+    northFirst: true,
+    box: [
+      [3_500_000, 5_336_000, 500],
+      [3_500_200, 5_336_100, 600],
+    ],
+  };
   expect(placeLayers([layer], {}, "x")).toEqual(expected);
   expect(placeLayers([layer], { axes: "east-north" }, "x").box[0]).toEqual([5_336_000, 3_500_000, 500]);
-  expect(placeLayers([layer], { crs: "EPSG:25832", box: BOX }, "x")).toEqual({ crs: "EPSG:25832", epsg: 25832, northFirst: false, box: BOX });
+  expect(placeLayers([layer], { crs: "EPSG:25832", box: BOX }, "x")).toEqual({
+    crs: "EPSG:25832",
+    epsg: 25832,
+    northFirst: false,
+    box: BOX,
+  });
   expect(() => placeLayers([layer], { crs: "EPSG:2056" }, "x")).toThrow(/not available in EPSG:2056; it has EPSG:4326, EPSG:25832/);
   expect(() => placeLayers([{ ...layer, boxes: boxes.slice(0, 1) }], {}, "x")).toThrow(/no bounding box in a projected coordinate system/);
-  expect(() => placeLayers([{ ...LAYER, crs: ["EPSG:25832"], boxes: [{ crs: "", low: [0, 0], high: [9, 9] }] }], {}, "x")).toThrow(/has no heights; give the option box/);
+  expect(() => placeLayers([{ ...LAYER, crs: ["EPSG:25832"], boxes: [{ crs: "", low: [0, 0], high: [9, 9] }] }], {}, "x")).toThrow(
+    /has no heights; give the option box/,
+  );
   const degrees = { crs: "", low: [11, 48], high: [11.1, 48.1] };
-  expect(() => placeLayers([{ ...LAYER, crs: ["X:1"], lonLatBox: degrees, boxes: [{ crs: "", low: [11, 48, 0], high: [11.1, 48.1, 9] }] }], {}, "x")).toThrow(/no bounding box in a projected/);
+  expect(() =>
+    placeLayers([{ ...LAYER, crs: ["X:1"], lonLatBox: degrees, boxes: [{ crs: "", low: [11, 48, 0], high: [11.1, 48.1, 9] }] }], {}, "x"),
+  ).toThrow(/no bounding box in a projected/);
 });
 
-const message = (parts: readonly [string, string][], boundary = "3DPS_MULTIPART_MESSAGE_BOUNDARY", end = "--\r\n"): ArrayBuffer => bytesOf(`preamble\r\n${parts.map(([type, body]) => `--${boundary}\r\nContent-Type: ${type}\r\n\r\n${body}\r\n`).join("")}--${boundary}${end}`);
-const texts = (found: readonly { mediaType: string; bytes: ArrayBuffer }[] | null): unknown => found?.map(({ mediaType, bytes }) => [mediaType, new TextDecoder("latin1").decode(bytes)]) ?? null;
+const message = (parts: readonly [string, string][], boundary = "3DPS_MULTIPART_MESSAGE_BOUNDARY", end = "--\r\n"): ArrayBuffer =>
+  bytesOf(
+    `preamble\r\n${parts.map(([type, body]) => `--${boundary}\r\nContent-Type: ${type}\r\n\r\n${body}\r\n`).join("")}--${boundary}${end}`,
+  );
+const texts = (found: readonly { mediaType: string; bytes: ArrayBuffer }[] | null): unknown =>
+  found?.map(({ mediaType, bytes }) => [mediaType, new TextDecoder("latin1").decode(bytes)]) ?? null;
 
 test("parts of a multipart message are bytes as they were", () => {
-  const parts: [string, string][] = [["image/png;mode=32bit", "\r\n--x\x00\xff\r\n"], ["Image/JPEG", "--"]];
-  const expected = [["image/png", "\r\n--x\x00\xff\r\n"], ["image/jpeg", "--"]];
+  const parts: [string, string][] = [
+    ["image/png;mode=32bit", "\r\n--x\x00\xff\r\n"],
+    ["Image/JPEG", "--"],
+  ];
+  const expected = [
+    ["image/png", "\r\n--x\x00\xff\r\n"],
+    ["image/jpeg", "--"],
+  ];
   expect(texts(splitMultipart(message(parts), "multipart/mixed"))).toEqual(expected);
   expect(texts(splitMultipart(message(parts, "a b"), 'multipart/mixed; charset=x; boundary="a b"'))).toEqual(expected);
-  expect(texts(splitMultipart(bytesOf(new TextDecoder("latin1").decode(message([["image/png", "x"]])).replaceAll("\r\n", "\n")), "multipart/mixed"))).toEqual([["image/png", "x"]]);
-  for (const broken of [message(parts, "other"), message(parts, undefined, ""), bytesOf(""), bytesOf("--3DPS_MULTIPART_MESSAGE_BOUNDARY\r\n--3DPS_MULTIPART_MESSAGE_BOUNDARY--")]) expect(splitMultipart(broken, "multipart/mixed")).toBeNull();
+  expect(
+    texts(
+      splitMultipart(bytesOf(new TextDecoder("latin1").decode(message([["image/png", "x"]])).replaceAll("\r\n", "\n")), "multipart/mixed"),
+    ),
+  ).toEqual([["image/png", "x"]]);
+  for (const broken of [
+    message(parts, "other"),
+    message(parts, undefined, ""),
+    bytesOf(""),
+    bytesOf("--3DPS_MULTIPART_MESSAGE_BOUNDARY\r\n--3DPS_MULTIPART_MESSAGE_BOUNDARY--"),
+  ])
+    expect(splitMultipart(broken, "multipart/mixed")).toBeNull();
 });
 
 test("headers of images", () => {
@@ -49,7 +89,12 @@ test("headers of images", () => {
   expect(readImageHeader(jpeg)).toEqual({ mediaType: "image/jpeg", width: 512, height: 256, complete: true });
   expect(readImageHeader(jpeg.subarray(0, jpeg.length - 3))?.complete).toBe(false);
   const riff = (chunk: string, rest: string): Uint8Array => new Uint8Array(bytesOf(`RIFF\x16\x00\x00\x00WEBP${chunk}${rest}`));
-  expect(readImageHeader(riff("VP8 ", "\0\0\0\0\0\0\0\x9d\x01\x2a\x00\x01\x80\x00"))).toEqual({ mediaType: "image/webp", width: 256, height: 128, complete: true });
+  expect(readImageHeader(riff("VP8 ", "\0\0\0\0\0\0\0\x9d\x01\x2a\x00\x01\x80\x00"))).toEqual({
+    mediaType: "image/webp",
+    width: 256,
+    height: 128,
+    complete: true,
+  });
   expect(readImageHeader(riff("VP8L", "\0\0\0\0\x2f\xff\xc0\x1f\x00\0\0\0\0\0"))).toMatchObject({ width: 256, height: 128 });
   expect(readImageHeader(riff("VP8X", "\0\0\0\0\0\0\0\0\xff\0\0\x7f\0\0"))).toMatchObject({ width: 256, height: 128 });
   for (const other of ["", "GIF89a", "\xff\xd8\xff", "RIFF", "<html>"]) expect(readImageHeader(new Uint8Array(bytesOf(other)))).toBeNull();
@@ -86,8 +131,12 @@ function service(together: (count: number) => Response, multipart?: boolean): { 
   };
   return { views: new ViewRequests(TEMPLATE, fetch, multipart), asked };
 }
-const ask = async (views: ViewRequests, tile: Tile, images: readonly RequestedImage[]): Promise<number[]> => (await Promise.all(images.map((image) => views.request(VIEW, tile, CAMERA, image)))).map(({ byteLength }) => byteLength);
-const packed = (count: number): Response => new Response(message(Array.from({ length: count }, (): [string, string] => ["image/png", PNG_TEXT])), { headers: { "Content-Type": "multipart/mixed" } });
+const ask = async (views: ViewRequests, tile: Tile, images: readonly RequestedImage[]): Promise<number[]> =>
+  (await Promise.all(images.map((image) => views.request(VIEW, tile, CAMERA, image)))).map(({ byteLength }) => byteLength);
+const packed = (count: number): Response =>
+  new Response(message(Array.from({ length: count }, (): [string, string] => ["image/png", PNG_TEXT])), {
+    headers: { "Content-Type": "multipart/mixed" },
+  });
 const T = { z: 0, x: 0, y: 0 };
 
 test("images of a tile are one request", async () => {
@@ -110,7 +159,9 @@ test.each<[string, () => Response]>([
 
 test("a service that has sent several images once is believed when it cannot", async () => {
   let count = 0;
-  const { views } = service((images) => (count++ === 0 ? packed(images) : new Response("oh", { headers: { "Content-Type": "text/html" } })));
+  const { views } = service((images) =>
+    count++ === 0 ? packed(images) : new Response("oh", { headers: { "Content-Type": "text/html" } }),
+  );
   await ask(views, T, [COLOR, NORMAL]);
   await expect(ask(views, { z: 1, x: 0, y: 0 }, [COLOR, NORMAL])).rejects.toThrow(/expected 2 images as multipart\/mixed, got text\/html/);
 });
@@ -123,10 +174,17 @@ test("a service that advertises single images is asked for them", async () => {
 
 test("an aborted request ends with its reason; the request ends with the last one", async () => {
   const signals: AbortSignal[] = [];
-  const views = new ViewRequests(TEMPLATE, (_, { signal }) => new Promise((__, reject) => {
-    signals.push(signal as AbortSignal);
-    signal?.addEventListener("abort", () => { reject(signal.reason as Error); });
-  }), undefined);
+  const views = new ViewRequests(
+    TEMPLATE,
+    (_, { signal }) =>
+      new Promise((__, reject) => {
+        signals.push(signal as AbortSignal);
+        signal?.addEventListener("abort", () => {
+          reject(signal.reason as Error);
+        });
+      }),
+    undefined,
+  );
   const [first, second] = [new AbortController(), new AbortController()];
   const asked = [views.request(VIEW, T, CAMERA, COLOR, first.signal), views.request(VIEW, T, CAMERA, NORMAL, second.signal)];
   const settled = Promise.allSettled(asked);
@@ -140,7 +198,17 @@ test("an aborted request ends with its reason; the request ends with the last on
 
 test("a busy service is asked again after the time it names, at most four times", async () => {
   let count = 0;
-  const busy = (times: number): ViewRequests => new ViewRequests(TEMPLATE, () => Promise.resolve(++count <= times ? new Response("busy", { status: 503, headers: { "Retry-After": "0" } }) : new Response(PNG, { headers: { "Content-Type": "image/png" } })), false);
+  const busy = (times: number): ViewRequests =>
+    new ViewRequests(
+      TEMPLATE,
+      () =>
+        Promise.resolve(
+          ++count <= times
+            ? new Response("busy", { status: 503, headers: { "Retry-After": "0" } })
+            : new Response(PNG, { headers: { "Content-Type": "image/png" } }),
+        ),
+      false,
+    );
   expect((await busy(3).request(VIEW, T, CAMERA, COLOR)).byteLength).toBe(PNG.length);
   expect(count).toBe(4);
   count = 0;

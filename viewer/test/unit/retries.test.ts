@@ -13,7 +13,13 @@ const TILES: readonly Tile[] = Array.from({ length: 148 }, (_, k) => ({ z: 4, x:
 type Answer = "silence" | "tile" | "missing";
 
 /** A screen full of tiles that are drawn, and requested, as in a map. */
-function openScreen(answers: { now: Answer }): { requests: string[]; errors: Error[]; loaded: () => number; online: () => void; pan: () => void } {
+function openScreen(answers: { now: Answer }): {
+  requests: string[];
+  errors: Error[];
+  loaded: () => number;
+  online: () => void;
+  pan: () => void;
+} {
   const [requests, errors] = [[] as string[], [] as Error[]];
   const respond = (url: string): Promise<Response> => {
     requests.push(url);
@@ -22,12 +28,18 @@ function openScreen(answers: { now: Answer }): { requests: string[]; errors: Err
   };
   const queue = new RequestQueue(12);
   const cache = new Cache<CachedTile>(1e9, () => undefined);
-  const decoder = { decode: () => Promise.resolve({ kind: "color", width: 1, height: 1, bitmap: { close: () => undefined } }) } as unknown as Decoder;
+  const decoder = {
+    decode: () => Promise.resolve({ kind: "color", width: 1, height: 1, bitmap: { close: () => undefined } }),
+  } as unknown as Decoder;
   const source = new HttpSource("http://host/town", respond);
   let requested = false;
   const frame = (): void => {
     requested = false;
-    queue.setRequests(TILES.filter((tile) => !layer.get(VIEW, LAYER, tile) && !layer.hasFailed(VIEW, LAYER, tile)).map((tile) => layer.makeRequest(VIEW, LAYER, tile)));
+    queue.setRequests(
+      TILES.filter((tile) => !layer.get(VIEW, LAYER, tile) && !layer.hasFailed(VIEW, LAYER, tile)).map((tile) =>
+        layer.makeRequest(VIEW, LAYER, tile),
+      ),
+    );
   };
   const requestFrame = (): void => {
     if (!requested) setTimeout(frame, 16);
@@ -38,7 +50,16 @@ function openScreen(answers: { now: Answer }): { requests: string[]; errors: Err
     requestFrame();
   });
   requestFrame();
-  return { requests, errors, loaded: () => cache.size, pan: requestFrame, online: () => { layer.clearFailures(); requestFrame(); } };
+  return {
+    requests,
+    errors,
+    loaded: () => cache.size,
+    pan: requestFrame,
+    online: () => {
+      layer.clearFailures();
+      requestFrame();
+    },
+  };
 }
 
 describe("when the network goes", () => {

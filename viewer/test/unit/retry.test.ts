@@ -1,11 +1,18 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { FailedAttempt, isTransientStatus, retry } from "../../src/core/retry";
 
-beforeEach(() => { vi.useFakeTimers(); });
-afterEach(() => { vi.useRealTimers(); });
+beforeEach(() => {
+  vi.useFakeTimers();
+});
+afterEach(() => {
+  vi.useRealTimers();
+});
 
 /** Returns when each attempt started, and how the last one ended. */
-async function record(failures: readonly (FailedAttempt | null)[], options: Parameters<typeof retry>[1] = {}): Promise<[starts_ms: number[], result: unknown]> {
+async function record(
+  failures: readonly (FailedAttempt | null)[],
+  options: Parameters<typeof retry>[1] = {},
+): Promise<[starts_ms: number[], result: unknown]> {
   const starts: number[] = [];
   const begin = Date.now();
   const ended = retry((failed) => {
@@ -42,12 +49,21 @@ test("a server chooses the wait, up to 30 s", async () => {
 
 test("a wait ends with its signal", async () => {
   const controller = new AbortController();
-  setTimeout(() => { controller.abort(new Error("left")); }, 100);
+  setTimeout(() => {
+    controller.abort(new Error("left"));
+  }, 100);
   const [starts, result] = await record([busy(), busy()], { signal: controller.signal });
   expect(starts).toEqual([0]);
   expect(String(result)).toBe("Error: left");
 });
 
-test.each([[200, false], [404, false], [429, true], [500, true], [501, false], [503, true]])("status %i is transient: %s", (status, expected) => {
+test.each([
+  [200, false],
+  [404, false],
+  [429, true],
+  [500, true],
+  [501, false],
+  [503, true],
+])("status %i is transient: %s", (status, expected) => {
   expect(isTransientStatus(status)).toBe(expected);
 });

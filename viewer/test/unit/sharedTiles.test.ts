@@ -9,16 +9,33 @@ import { DATA_TYPE } from "../../src/tiles/tileData";
 
 const VIEW = { id: "0-45", occupancy: { has: () => true } } as unknown as View;
 const TILE = { z: 1, x: 0, y: 1 };
-const [NORMAL, ID, DEPTH] = ["normal", "id", "depth"].map((kind): LayerInfo => ({ name: "data", kind, format: "m3d", media_type: DATA_TYPE })) as [LayerInfo, LayerInfo, LayerInfo];
+const [NORMAL, ID, DEPTH] = ["normal", "id", "depth"].map((kind): LayerInfo => ({
+  name: "data",
+  kind,
+  format: "m3d",
+  media_type: DATA_TYPE,
+})) as [LayerInfo, LayerInfo, LayerInfo];
 
 /** Tiles whose source answers when told; the decoder says what it was given. */
-function open(): { layer: LayerTiles; queue: RequestQueue; answers: ((bytes: ArrayBuffer | Error | null) => void)[]; decoded: string[]; errors: Error[] } {
+function open(): {
+  layer: LayerTiles;
+  queue: RequestQueue;
+  answers: ((bytes: ArrayBuffer | Error | null) => void)[];
+  decoded: string[];
+  errors: Error[];
+} {
   const [answers, decoded, errors]: [((bytes: ArrayBuffer | Error | null) => void)[], string[], Error[]] = [[], [], []];
   const source = {
-    tile: (_view: unknown, _layer: unknown, _tile: unknown, signal: AbortSignal) => new Promise<ArrayBuffer | null>((resolve, reject) => {
-      signal.addEventListener("abort", () => { reject(signal.reason as Error); });
-      answers.push((bytes) => { if (bytes instanceof Error) reject(bytes); else resolve(bytes); });
-    }),
+    tile: (_view: unknown, _layer: unknown, _tile: unknown, signal: AbortSignal) =>
+      new Promise<ArrayBuffer | null>((resolve, reject) => {
+        signal.addEventListener("abort", () => {
+          reject(signal.reason as Error);
+        });
+        answers.push((bytes) => {
+          if (bytes instanceof Error) reject(bytes);
+          else resolve(bytes);
+        });
+      }),
   } as unknown as Source;
   const decoder = {
     decode: (kind: string, _type: string, bytes: ArrayBuffer, keep: boolean) => {
@@ -27,7 +44,9 @@ function open(): { layer: LayerTiles; queue: RequestQueue; answers: ((bytes: Arr
     },
   } as unknown as Decoder;
   const queue = new RequestQueue(12);
-  const layer = new LayerTiles("layer0", source, { cache: new Cache<CachedTile>(1e6, () => undefined), queue, decoder }, (error) => { if (error) errors.push(error); });
+  const layer = new LayerTiles("layer0", source, { cache: new Cache<CachedTile>(1e6, () => undefined), queue, decoder }, (error) => {
+    if (error) errors.push(error);
+  });
   return { layer, queue, answers, decoded, errors };
 }
 

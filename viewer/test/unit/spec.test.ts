@@ -8,18 +8,34 @@ import type { Box3, Vec3 } from "../../src/core/vec";
 import { pin } from "../fixture/town";
 import { encodeOccupancy } from "../fixture/rendering";
 
-const vectors = <T>(name: string): T => JSON.parse(readFileSync(resolve(import.meta.dirname, `../../../spec/vectors/${name}.json`), "utf8")) as T;
+const vectors = <T>(name: string): T =>
+  JSON.parse(readFileSync(resolve(import.meta.dirname, `../../../spec/vectors/${name}.json`), "utf8")) as T;
 
-interface ViewRow { look_at_deg: number; pitch_deg: number; id: string; right: Vec3; up: Vec3; forward: Vec3; points: { local: Vec3; uvd: Vec3 }[] }
+interface ViewRow {
+  look_at_deg: number;
+  pitch_deg: number;
+  id: string;
+  right: Vec3;
+  up: Vec3;
+  forward: Vec3;
+  points: { local: Vec3; uvd: Vec3 }[];
+}
 
 describe("views", () => {
   test.each(vectors<ViewRow[]>("views"))("the axes of view $id and its coordinates of points match the vectors", (row) => {
     const axes = computeAxes(row.look_at_deg, row.pitch_deg);
     expect(viewId(row.look_at_deg, row.pitch_deg)).toBe(row.id);
-    for (const name of ["right", "up", "forward"] as const) row[name].forEach((part, k) => { expect(axes[name][k as 0]).toBeCloseTo(part, 15); });
+    for (const name of ["right", "up", "forward"] as const)
+      row[name].forEach((part, k) => {
+        expect(axes[name][k as 0]).toBeCloseTo(part, 15);
+      });
     for (const { local, uvd } of row.points) {
-      uvdFromLocal(axes, local).forEach((part, k) => { expect(part).toBeCloseTo(uvd[k as 0], 9); });
-      localFromUvd(axes, uvd).forEach((part, k) => { expect(part).toBeCloseTo(local[k as 0], 9); });
+      uvdFromLocal(axes, local).forEach((part, k) => {
+        expect(part).toBeCloseTo(uvd[k as 0], 9);
+      });
+      localFromUvd(axes, uvd).forEach((part, k) => {
+        expect(part).toBeCloseTo(local[k as 0], 9);
+      });
     }
   });
 
@@ -31,7 +47,19 @@ describe("views", () => {
   });
 });
 
-interface TilesFile { frame: { zmax: number; size_m: number; views: FrameJson[] }; view: number; tile_px: number; rows: { tile: [number, number, number]; pixel: [number, number]; u: number; v: number; morton: number; parent: [number, number, number] | null }[] }
+interface TilesFile {
+  frame: { zmax: number; size_m: number; views: FrameJson[] };
+  view: number;
+  tile_px: number;
+  rows: {
+    tile: [number, number, number];
+    pixel: [number, number];
+    u: number;
+    v: number;
+    morton: number;
+    parent: [number, number, number] | null;
+  }[];
+}
 
 describe("tiles", () => {
   const file = vectors<TilesFile>("tiles");
@@ -63,9 +91,12 @@ describe("tiles", () => {
 });
 
 describe("blocks", () => {
-  test.each(vectors<{ zmax: number; blocks: [number, number, string][] }[]>("blocks"))("zmax $zmax: each level is in the block of the vectors", ({ zmax, blocks }) => {
-    for (const [root, levels] of blocks) for (let z = root; z < root + levels; z++) expect(blockLevel(z, zmax)).toBe(root);
-  });
+  test.each(vectors<{ zmax: number; blocks: [number, number, string][] }[]>("blocks"))(
+    "zmax $zmax: each level is in the block of the vectors",
+    ({ zmax, blocks }) => {
+      for (const [root, levels] of blocks) for (let z = root; z < root + levels; z++) expect(blockLevel(z, zmax)).toBe(root);
+    },
+  );
 
   test("a tile's block is its ancestor at the root level", () => {
     expect(blockRoot({ z: 5, x: 21, y: 30 }, 5)).toEqual({ z: 2, x: 2, y: 3 });
@@ -74,7 +105,13 @@ describe("blocks", () => {
 });
 
 describe("frames", () => {
-  interface Row { box: Box3; tile_px: number; res_m: number; views_deg: [number, number][]; pinned: { zmax: number; size_m: number; views: FrameJson[] } }
+  interface Row {
+    box: Box3;
+    tile_px: number;
+    res_m: number;
+    views_deg: [number, number][];
+    pinned: { zmax: number; size_m: number; views: FrameJson[] };
+  }
   test.each(vectors<Row[]>("frames"))("the fixture pins $box like the vectors", (row) => {
     const { size, zmax, numbers } = pin(row.box, row.tile_px, row.res_m, row.views_deg);
     expect([size, zmax]).toEqual([row.pinned.size_m, row.pinned.zmax]);
@@ -87,15 +124,19 @@ describe("frames", () => {
 });
 
 describe("occupancy", () => {
-  test.each(vectors<{ zmax: number; occupied: [number, number][]; base64: string }[]>("occupancy"))("$base64", ({ zmax, occupied, base64 }) => {
-    const occupancy = new Occupancy(base64, zmax);
-    const has = (z: number, x: number, y: number): boolean => occupied.some(([bx, by]) => bx >> (zmax - z) === x && by >> (zmax - z) === y);
-    for (let z = 0; z <= zmax; z++) {
-      for (let y = 0; y < 2 ** z; y++) for (let x = 0; x < 2 ** z; x++) expect(occupancy.has({ z, x, y })).toBe(has(z, x, y));
-    }
-    expect(occupancy.has({ z: zmax + 1, x: 0, y: 0 })).toBe(false);
-    expect(encodeOccupancy(zmax, ({ z, x, y }) => has(z, x, y))).toBe(base64);
-  });
+  test.each(vectors<{ zmax: number; occupied: [number, number][]; base64: string }[]>("occupancy"))(
+    "$base64",
+    ({ zmax, occupied, base64 }) => {
+      const occupancy = new Occupancy(base64, zmax);
+      const has = (z: number, x: number, y: number): boolean =>
+        occupied.some(([bx, by]) => bx >> (zmax - z) === x && by >> (zmax - z) === y);
+      for (let z = 0; z <= zmax; z++) {
+        for (let y = 0; y < 2 ** z; y++) for (let x = 0; x < 2 ** z; x++) expect(occupancy.has({ z, x, y })).toBe(has(z, x, y));
+      }
+      expect(occupancy.has({ z: zmax + 1, x: 0, y: 0 })).toBe(false);
+      expect(encodeOccupancy(zmax, ({ z, x, y }) => has(z, x, y))).toBe(base64);
+    },
+  );
 
   test("truncated bits are refused", () => {
     expect(() => new Occupancy("/w==", 6)).toThrow(/occupancy ends after 1 bytes/);

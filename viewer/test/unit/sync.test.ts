@@ -12,6 +12,8 @@ describe("maps that move together", () => {
     ["too few turns", [fake, make()], { turns_deg: [0] }, /turns_deg must be a number of degrees for each of the 2 maps/],
     ["turns that are no numbers", [fake, make()], { turns_deg: [0, "180"] }, /turns_deg must be a number of degrees/],
   ])("%s are refused", (_, maps, options, message) => {
-    expect(() => new sync(maps, options)).toThrow(expect.objectContaining({ name: "UsageError", message: expect.stringMatching(message) as string }));
+    expect(() => new sync(maps, options)).toThrow(
+      expect.objectContaining({ name: "UsageError", message: expect.stringMatching(message) as string }),
+    );
   });
 });

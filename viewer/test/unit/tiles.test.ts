@@ -14,14 +14,23 @@ const frame = makeFrame({ id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -512,
 const area = ({ z }: Tile): number => (frame.size / 2 ** z) ** 2;
 
 describe("cover", () => {
-  const rect: Rect = [[-100.5, -333], [260.25, 120]];
+  const rect: Rect = [
+    [-100.5, -333],
+    [260.25, 120],
+  ];
 
   test.each([0, 1, 2, 3, 4])("tiles of level %i partition the viewport", (level) => {
     const tiles = findCover(frame, () => true, level, rect);
     const tile_m = frame.size / 2 ** level;
     for (let k = 0; k < 400; k++) {
-      const [u, v] = [rect[0][0] + ((k * 0.618) % 1) * (rect[1][0] - rect[0][0]), rect[0][1] + ((k * 0.414) % 1) * (rect[1][1] - rect[0][1])];
-      const holding = tiles.filter(({ x, y }) => u >= frame.u0 + x * tile_m && u < frame.u0 + (x + 1) * tile_m && v <= frame.v0 - y * tile_m && v > frame.v0 - (y + 1) * tile_m);
+      const [u, v] = [
+        rect[0][0] + ((k * 0.618) % 1) * (rect[1][0] - rect[0][0]),
+        rect[0][1] + ((k * 0.414) % 1) * (rect[1][1] - rect[0][1]),
+      ];
+      const holding = tiles.filter(
+        ({ x, y }) =>
+          u >= frame.u0 + x * tile_m && u < frame.u0 + (x + 1) * tile_m && v <= frame.v0 - y * tile_m && v > frame.v0 - (y + 1) * tile_m,
+      );
       expect(holding).toHaveLength(1);
     }
     for (const { x, y } of tiles) {
@@ -32,23 +41,48 @@ describe("cover", () => {
 
   test("no tile is outside the occupancy or the square", () => {
     const occupied = ({ x, y }: Tile): boolean => (x + y) % 2 === 0;
-    const tiles = findCover(frame, occupied, 3, [[-5000, -5000], [5000, 5000]]);
+    const tiles = findCover(frame, occupied, 3, [
+      [-5000, -5000],
+      [5000, 5000],
+    ]);
     expect(tiles).toHaveLength(32);
     expect(tiles.every(occupied)).toBe(true);
   });
 
   test("a viewport outside the square has no tiles", () => {
-    expect(findCover(frame, () => true, 4, [[600, 600], [700, 700]])).toEqual([]);
+    expect(
+      findCover(frame, () => true, 4, [
+        [600, 600],
+        [700, 700],
+      ]),
+    ).toEqual([]);
   });
 
   test("tiles at the centre come first", () => {
-    const ordered = sortFromCenter(frame, findCover(frame, () => true, 2, [[-512, -512], [512, 512]]), [[256, 256], [512, 512]]);
+    const ordered = sortFromCenter(
+      frame,
+      findCover(frame, () => true, 2, [
+        [-512, -512],
+        [512, 512],
+      ]),
+      [
+        [256, 256],
+        [512, 512],
+      ],
+    );
     expect(ordered[0]).toEqual({ z: 2, x: 3, y: 0 });
   });
 });
 
 describe("level", () => {
-  test.each([[1, 1, 2], [0.5, 1, 3], [0.7, 1, 3], [0.72, 1, 2], [0.01, 1, 4], [1000, 1, 0]])("a device pixel of %d m at ratio %d shows level %d", (px, dpr, level) => {
+  test.each([
+    [1, 1, 2],
+    [0.5, 1, 3],
+    [0.7, 1, 3],
+    [0.72, 1, 2],
+    [0.01, 1, 4],
+    [1000, 1, 0],
+  ])("a device pixel of %d m at ratio %d shows level %d", (px, dpr, level) => {
     expect(computeLevel(frame, px, dpr)).toBe(level);
   });
 
@@ -64,7 +98,10 @@ describe("level", () => {
 
 describe("fallbacks", () => {
   const all = (): boolean => true;
-  const only = (...names: string[]) => ({ z, x, y }: Tile): boolean => names.includes(`${String(z)}/${String(x)}/${String(y)}`);
+  const only =
+    (...names: string[]) =>
+    ({ z, x, y }: Tile): boolean =>
+      names.includes(`${String(z)}/${String(x)}/${String(y)}`);
   const tile = { z: 3, x: 5, y: 2 };
 
   test("a ready tile is drawn itself", () => {
@@ -143,10 +180,18 @@ describe("cache", () => {
 
 describe("URLs", () => {
   test("a tile's URL matches the specification", () => {
-    expect(tileUrl("https://a.example/tiles/teatime", "45-22.5", "color", { z: 3, x: 1, y: 6 }, 4)).toBe("https://a.example/tiles/teatime/45-22.5/color/3/1/6?v=4");
+    expect(tileUrl("https://a.example/tiles/teatime", "45-22.5", "color", { z: 3, x: 1, y: 6 }, 4)).toBe(
+      "https://a.example/tiles/teatime/45-22.5/color/3/1/6?v=4",
+    );
   });
 
-  test.each([["http://t1/tiles/teatime/", "http://t1/tiles/teatime"], [".", "http://p/a"], ["", "http://p/a"], ["../b", "http://p/b"], ["/c/?x=1#y", "http://p/c"]])("base %s", (url, want) => {
+  test.each([
+    ["http://t1/tiles/teatime/", "http://t1/tiles/teatime"],
+    [".", "http://p/a"],
+    ["", "http://p/a"],
+    ["../b", "http://p/b"],
+    ["/c/?x=1#y", "http://p/c"],
+  ])("base %s", (url, want) => {
     expect(normalizeBaseUrl(url, "http://p/a/index.html")).toBe(want);
   });
 
@@ -160,7 +205,13 @@ describe("URLs", () => {
 });
 
 describe("cache size", () => {
-  test.each([["a phone", 390, 844, 3], ["a phone", 390, 844, 2], ["a tablet", 820, 1180, 2], ["a laptop", 1440, 900, 2], ["a desk", 1920, 1080, 1]])("the cache of %s, %i × %i at %i, holds the tiles of three views", (_, width, height, dpr) => {
+  test.each([
+    ["a phone", 390, 844, 3],
+    ["a phone", 390, 844, 2],
+    ["a tablet", 820, 1180, 2],
+    ["a laptop", 1440, 900, 2],
+    ["a desk", 1920, 1080, 1],
+  ])("the cache of %s, %i × %i at %i, holds the tiles of three views", (_, width, height, dpr) => {
     const finer = Math.min(0, Math.log2(DEFAULTS.maxTileRatio / dpr));
     const finest = dpr > 1 ? dpr * 2 ** finer : Math.SQRT2; // tile pixels per CSS pixel: see computeLevel
     const view_bytes = (width * finest + 256) * (height * finest + 256) * 7; // colours and normals
@@ -169,7 +220,9 @@ describe("cache size", () => {
 });
 
 describe("fetch", () => {
-  afterEach(() => { vi.unstubAllGlobals(); });
+  afterEach(() => {
+    vi.unstubAllGlobals();
+  });
   const answers = (...list: (number | Error)[]): string[] => {
     const asked: string[] = [];
     vi.stubGlobal("fetch", (url: string) => {
@@ -203,7 +256,9 @@ describe("fetch", () => {
     answers(503);
     const abort = new AbortController();
     const fetching = fetchBytes(["a"], { backoff_ms: 60_000, signal: abort.signal });
-    setTimeout(() => { abort.abort(); }, 5);
+    setTimeout(() => {
+      abort.abort();
+    }, 5);
     await expect(fetching).rejects.toMatchObject({ name: "AbortError" });
   });
 
@@ -275,7 +330,12 @@ describe("queue", () => {
 describe("PMTiles", () => {
   test("tile ids match the reference reader up to level 26", () => {
     for (let z = 0; z <= 26; z++) {
-      for (const [a, b] of [[0, 0], [0.3, 0.9], [0.77, 0.11], [0.999999, 0.999999]] as const) {
+      for (const [a, b] of [
+        [0, 0],
+        [0.3, 0.9],
+        [0.77, 0.11],
+        [0.999999, 0.999999],
+      ] as const) {
         const [x, y] = [Math.floor(a * 2 ** z), Math.floor(b * 2 ** z)];
         expect(tileId({ z, x, y })).toBe(zxyToTileId(z, x, y));
       }
@@ -285,15 +345,23 @@ describe("PMTiles", () => {
   /** An archive of level 2's 16 tiles with one leaf directory; the last four tiles share one content. */
   function archive(): Uint8Array<ArrayBuffer> {
     const varint = (value: number): number[] => (value < 128 ? [value] : [(value % 128) | 128, ...varint(Math.floor(value / 128))]);
-    const directory = (rows: [step: number, run: number, length: number, offset: number][]): Buffer => gzipSync(Buffer.from([...varint(rows.length), ...[0, 1, 2, 3].flatMap((k) => rows.flatMap((row) => varint(row[k] as number)))]));
-    const rows = Array.from({ length: 13 }, (_, k): [number, number, number, number] => [k === 0 ? 5 : 1, k === 12 ? 4 : 1, 3, k === 0 ? 1 : 0]);
+    const directory = (rows: [step: number, run: number, length: number, offset: number][]): Buffer =>
+      gzipSync(Buffer.from([...varint(rows.length), ...[0, 1, 2, 3].flatMap((k) => rows.flatMap((row) => varint(row[k] as number)))]));
+    const rows = Array.from({ length: 13 }, (_, k): [number, number, number, number] => [
+      k === 0 ? 5 : 1,
+      k === 12 ? 4 : 1,
+      3,
+      k === 0 ? 1 : 0,
+    ]);
     const leaf = directory(rows);
     const root = directory([[5, 0, leaf.length, 1]]);
     const tiles = Buffer.from(Array.from({ length: 13 }, (_, k) => [k, k, k]).flat());
     const header = Buffer.alloc(127);
     header.write("PMTiles");
     header[7] = 3;
-    [127, root.length, 0, 0, 127 + root.length, leaf.length, 127 + root.length + leaf.length, tiles.length].forEach((value, k) => header.writeBigUInt64LE(BigInt(value), 8 + 8 * k));
+    [127, root.length, 0, 0, 127 + root.length, leaf.length, 127 + root.length + leaf.length, tiles.length].forEach((value, k) =>
+      header.writeBigUInt64LE(BigInt(value), 8 + 8 * k),
+    );
     header.set([1, 2, 1, 2, 0, 2], 96);
     return new Uint8Array(Buffer.concat([header, root, leaf, tiles]));
   }
@@ -308,7 +376,9 @@ describe("PMTiles", () => {
       for (let x = 0; x < 4; x++) {
         const want = (await theirs.getZxy(2, x, y))?.data;
         expect(want).toBeDefined();
-        expect([...new Uint8Array((await mine.tile({ z: 2, x, y })) ?? new ArrayBuffer(0))]).toEqual([...new Uint8Array(want ?? new ArrayBuffer(0))]);
+        expect([...new Uint8Array((await mine.tile({ z: 2, x, y })) ?? new ArrayBuffer(0))]).toEqual([
+          ...new Uint8Array(want ?? new ArrayBuffer(0)),
+        ]);
       }
     }
     expect(await mine.tile({ z: 1, x: 0, y: 0 })).toBeNull();
@@ -316,6 +386,8 @@ describe("PMTiles", () => {
   });
 
   test("a file that is not an archive is refused", async () => {
-    await expect(new Archive("x.pmtiles", () => Promise.resolve(new ArrayBuffer(200))).tile({ z: 0, x: 0, y: 0 })).rejects.toThrow(/not a PMTiles/);
+    await expect(new Archive("x.pmtiles", () => Promise.resolve(new ArrayBuffer(200))).tile({ z: 0, x: 0, y: 0 })).rejects.toThrow(
+      /not a PMTiles/,
+    );
   });
 });

@@ -18,7 +18,9 @@ class Box {
   get firstElementChild(): Box | undefined {
     return this.children[0];
   }
-  addEventListener(): void { /* its button is not pressed */ }
+  addEventListener(): void {
+    /* its button is not pressed */
+  }
 }
 
 const [toasts, device, events] = [new Box(), { onLine: true, languages: ["en"] }, new Map<string, (event: unknown) => void>()];
@@ -41,7 +43,10 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
-const ignoresRange = (file: string): Error => new Error(`http://host/town/${file}.pmtiles: the server ignores range requests (HTTP 200, expected 206); use one that supports them, such as nginx, Apache or Caddy`);
+const ignoresRange = (file: string): Error =>
+  new Error(
+    `http://host/town/${file}.pmtiles: the server ignores range requests (HTTP 200, expected 206); use one that supports them, such as nginx, Apache or Caddy`,
+  );
 
 test("errors that differ by URL only are shown once, also after the toast has gone", () => {
   for (const file of ["0-45/color", "0-45/normal", "0-45/depth"]) page.report(ignoresRange(file));

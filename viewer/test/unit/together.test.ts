@@ -10,15 +10,29 @@ import { NO_DEPTH } from "../../src/tiles/tileData";
 
 const VIEW = { id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -50, v0_m: 40, d0_m: -1000 };
 const own: DepthMapping = { frame: makeFrame(VIEW, 100, 16, 2), shift: [0, 0, 0], unit_m: 1 / 1024, bias_m: 0, range: [-900, -800] };
-const other: DepthMapping = { frame: makeFrame({ ...VIEW, u0_m: -70, v0_m: 61, d0_m: -1200 }, 170, 16, 3), shift: [7.25, -3.5, 11], unit_m: 1 / 512, bias_m: 0.5, range: [-950, -700] };
+const other: DepthMapping = {
+  frame: makeFrame({ ...VIEW, u0_m: -70, v0_m: 61, d0_m: -1200 }, 170, 16, 3),
+  shift: [7.25, -3.5, 11],
+  unit_m: 1 / 512,
+  bias_m: 0.5,
+  range: [-950, -700],
+};
 
 describe("a mask", () => {
   test("reads the pixel at the centre of each pixel, at any level and origin", () => {
-    const [tile, above] = [{ z: 1, x: 0, y: 1 }, { z: 3, x: 2, y: 3 }];
+    const [tile, above] = [
+      { z: 1, x: 0, y: 1 },
+      { z: 3, x: 2, y: 3 },
+    ];
     const mask = makeMask(own, tile, other, above, { depth: "d", color: null });
     if (!mask) throw new Error("the tiles overlap");
     const [u0, v0, px] = computeCorner(other, above);
-    for (const [i, j] of [[0, 0], [3, 5], [9, 1], [15, 15]] as const) {
+    for (const [i, j] of [
+      [0, 0],
+      [3, 5],
+      [9, 1],
+      [15, 15],
+    ] as const) {
       const [u, v] = uvOfPixel(own.frame, tile, i, j);
       expect(Math.floor(mask.x + i * mask.step)).toBe(Math.floor((u - u0) / px));
       expect(Math.floor(mask.y + j * mask.step)).toBe(Math.floor((v0 - v) / px));
@@ -58,7 +72,8 @@ test("clips overlap if they have a point in common", () => {
 });
 
 test("combined layers form one group at the position of the first", () => {
-  const layer = (name: string, combines: boolean, clip: Clip | null = null): imageLayer => ({ name, isCombinable: combines, clip }) as unknown as imageLayer;
+  const layer = (name: string, combines: boolean, clip: Clip | null = null): imageLayer =>
+    ({ name, isCombinable: combines, clip }) as unknown as imageLayer;
   const [a, b, c, d] = [layer("a", false), layer("b", true), layer("c", false), layer("d", true)];
   expect(groupByDepth([a, b, c, d])).toEqual([[a], [b, d], [c]]);
   expect(findCombinedLayers([a, b, c])).toEqual([]);
@@ -71,18 +86,33 @@ test("combined layers form one group at the position of the first", () => {
 describe("renderings on one map", () => {
   const rendering = (crs: Partial<ManifestJson["crs"]>, angles: readonly (readonly [number, number])[] = [[0, 45]]): Rendering => ({
     json: { crs: { epsg: 25832, wkt: null, name: "UTM 32", vertical: null, ...crs } } as ManifestJson,
-    views: new Map(angles.map(([a, p]) => [`${String(a)}:${String(p)}`, { frame: makeFrame({ ...VIEW, look_at_deg: a, pitch_deg: p }, 10, 16, 1) } as never])),
+    views: new Map(
+      angles.map(([a, p]) => [
+        `${String(a)}:${String(p)}`,
+        { frame: makeFrame({ ...VIEW, look_at_deg: a, pitch_deg: p }, 10, 16, 1) } as never,
+      ]),
+    ),
     layers: new Map(),
   });
 
   test("are compatible if they share CRS, heights and a view, whatever the views' ids", () => {
     expect(findIncompatibility(rendering({}), rendering({ name: "ETRS89 / UTM zone 32N" }))).toBeNull();
-    expect(findIncompatibility(rendering({}), rendering({}, [[90, 45], [0, 45]]))).toBeNull();
+    expect(
+      findIncompatibility(
+        rendering({}),
+        rendering({}, [
+          [90, 45],
+          [0, 45],
+        ]),
+      ),
+    ).toBeNull();
     expect(findIncompatibility(rendering({ epsg: null }), rendering({ epsg: null }))).toBeNull();
   });
 
   test("are refused with a reason", () => {
-    expect(findIncompatibility(rendering({}), rendering({ epsg: 2056, name: "LV95" }))).toMatch(/CRS is "EPSG:2056 LV95".*"EPSG:25832 UTM 32"/);
+    expect(findIncompatibility(rendering({}), rendering({ epsg: 2056, name: "LV95" }))).toMatch(
+      /CRS is "EPSG:2056 LV95".*"EPSG:25832 UTM 32"/,
+    );
     expect(findIncompatibility(rendering({ epsg: null, name: "a" }), rendering({ epsg: null, name: "b" }))).toMatch(/CRS is "b"/);
     expect(findIncompatibility(rendering({ epsg: null, wkt: "A" }), rendering({ epsg: null, wkt: "B" }))).toMatch(/CRS/);
     expect(findIncompatibility(rendering({ vertical: "DHHN2016" }), rendering({ vertical: "NAP" }))).toMatch(/heights are NAP.*DHHN2016/);

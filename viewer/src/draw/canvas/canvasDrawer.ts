@@ -40,8 +40,17 @@ export class CanvasDrawer implements Drawer {
 
   /** @param preserve draws on the canvas itself, so that its pixels can be read  @throws DrawError when the canvas has another context, or the browser has no 2D canvas */
   constructor(canvas: HTMLCanvasElement, preserve: boolean, events: DrawerEvents) {
-    this.#compositor = new (preserve ? CanvasCompositor : CssCompositor)(canvas, () => { events.changed(); });
-    this.#pictures = new TilePictures({ made: () => { events.changed(); }, failed: (error) => { events.failed(error); } });
+    this.#compositor = new (preserve ? CanvasCompositor : CssCompositor)(canvas, () => {
+      events.changed();
+    });
+    this.#pictures = new TilePictures({
+      made: () => {
+        events.changed();
+      },
+      failed: (error) => {
+        events.failed(error);
+      },
+    });
   }
 
   get busy(): boolean {
@@ -54,11 +63,17 @@ export class CanvasDrawer implements Drawer {
 
   draw(frame: FrameContent): void {
     const wanted = frame.passes.map((pass) => [pass, this.#uploadPass(frame, pass)] as const);
-    const requests = wanted.flatMap(([pass, tiles]) => [...tiles].map(([name, tile]) => this.#makeRequest(frame.passes, pass, this.#pictures.getOrCreate(name), tile)));
+    const requests = wanted.flatMap(([pass, tiles]) =>
+      [...tiles].map(([name, tile]) => this.#makeRequest(frame.passes, pass, this.#pictures.getOrCreate(name), tile)),
+    );
     this.#pictures.setRequests(requests.filter(({ urgency }) => urgency.length > 0));
     const view = frame.camera.frame.id;
     this.showsPreviousView = view !== (this.#shownView ??= view) && this.busy && !frame.passes.every((pass) => this.#isCovered(pass));
-    if (!this.showsPreviousView) this.#compositor.show(frame, wanted.flatMap(([pass, tiles]) => this.#composePass(pass, tiles)));
+    if (!this.showsPreviousView)
+      this.#compositor.show(
+        frame,
+        wanted.flatMap(([pass, tiles]) => this.#composePass(pass, tiles)),
+      );
     if (!this.showsPreviousView) this.#shownView = view;
     this.#dropUnused(frame.passes);
     if (this.busy) return;
@@ -83,7 +98,10 @@ export class CanvasDrawer implements Drawer {
 
   /** Sends the worker missing data. @returns the visible tiles by picture name */
   #uploadPass(frame: FrameContent, pass: LayerPass): Map<string, WantedTile> {
-    const names = { highlight: pass.highlight.size > 0 ? this.#uploadValues(pass.highlight) : null, styles: pass.drawStyles && this.#uploadValues(pass.drawStyles) };
+    const names = {
+      highlight: pass.highlight.size > 0 ? this.#uploadValues(pass.highlight) : null,
+      styles: pass.drawStyles && this.#uploadValues(pass.drawStyles),
+    };
     const wanted = new Map<string, WantedTile>();
     for (const { from, rect, scale } of pass.quads) {
       const name = makeName(pass, from);
@@ -120,7 +138,9 @@ export class CanvasDrawer implements Drawer {
     const grid = makeGrid(pass, this.#tilePx);
     if (!grid || this.#tilePx === 0) return [];
     const mosaic = quads.filter(({ from }) => wanted.has(makeName(pass, from))).flatMap((quad) => this.#findMosaicTiles(pass, grid, quad));
-    return mosaic.length > 0 ? [{ grid, tiles: mosaic, smooth: mode === "lit" || mode === "color" || mode === "picture", opacity, clip }] : [];
+    return mosaic.length > 0
+      ? [{ grid, tiles: mosaic, smooth: mode === "lit" || mode === "color" || mode === "picture", opacity, clip }]
+      : [];
   }
 
   /** Whether there are pictures for all quads of a pass, if only coarse ones. */
@@ -135,12 +155,22 @@ export class CanvasDrawer implements Drawer {
     const imageOf = (tile: Tile): TileImage | undefined => this.#pictures.get(makeName(pass, tile))?.image;
     const own = imageOf(from);
     if (own) return [{ area, from, image: own }];
-    const fallbacks = findFallbacks(area, (tile) => imageOf(tile) !== undefined, () => true, area.z > grid.level ? 0 : 2);
+    const fallbacks = findFallbacks(
+      area,
+      (tile) => imageOf(tile) !== undefined,
+      () => true,
+      area.z > grid.level ? 0 : 2,
+    );
     return fallbacks.map((fallback) => ({ ...fallback, image: imageOf(fallback.from) as TileImage }));
   }
 
   /** Makes a request; an up-to-date picture has an empty urgency. */
-  #makeRequest(passes: readonly LayerPass[], pass: LayerPass, picture: TilePicture, { from, options, layers, distance }: WantedTile): PictureRequest {
+  #makeRequest(
+    passes: readonly LayerPass[],
+    pass: LayerPass,
+    picture: TilePicture,
+    { from, options, layers, distance }: WantedTile,
+  ): PictureRequest {
     const { tiles } = pass;
     const restricted = { ...restrictOptions(options, (kind) => layers[kind] !== undefined), masks: this.#findMasks(passes, pass, from) };
     const neighbours: Partial<Record<LayerKind, string[]>> = {};
@@ -151,7 +181,13 @@ export class CanvasDrawer implements Drawer {
       neighbours[kind] = keys;
     }
     const text = JSON.stringify(restricted);
-    return { picture, options: text, edges, request: { options: restricted, layers, neighbours }, urgency: computeUrgency(picture, text, edges, distance) };
+    return {
+      picture,
+      options: text,
+      edges,
+      request: { options: restricted, layers, neighbours },
+      urgency: computeUrgency(picture, text, edges, distance),
+    };
   }
 
   /** Finds tiles of other layers that may hide parts of this tile. */
@@ -162,7 +198,10 @@ export class CanvasDrawer implements Drawer {
       const above = new Map(other.quads.map((quad) => [other.tiles.key("depth", quad.from), quad.from]));
       return [...above].flatMap(([depth, tile]) => {
         const color = other.tiles.key(other.mode === "picture" ? "picture" : "color", tile);
-        const mask = other.depths && this.#uploaded.has(depth) ? makeMask(depths, from, other.depths, tile, { depth, color: other.masked || !this.#uploaded.has(color) ? null : color }) : null;
+        const mask =
+          other.depths && this.#uploaded.has(depth)
+            ? makeMask(depths, from, other.depths, tile, { depth, color: other.masked || !this.#uploaded.has(color) ? null : color })
+            : null;
         return mask ? [mask] : [];
       });
     });
@@ -186,10 +225,16 @@ export class CanvasDrawer implements Drawer {
   }
 }
 
-const NEIGHBOURS = [[-1, 0], [1, 0], [0, -1], [0, 1]] as const;
+const NEIGHBOURS = [
+  [-1, 0],
+  [1, 0],
+  [0, -1],
+  [0, 1],
+] as const;
 
 /** The name of a tile's picture in any mode. */
-const makeName = ({ tiles, mode }: LayerPass, tile: Tile): string => tiles.key("color", tile) || tiles.key(mode === "lit" ? "color" : mode, tile);
+const makeName = ({ tiles, mode }: LayerPass, tile: Tile): string =>
+  tiles.key("color", tile) || tiles.key(mode === "lit" ? "color" : mode, tile);
 
 /** Missing pictures come first, then outdated ones (oldest first), then edges; all from the screen's centre outwards. */
 function computeUrgency(picture: TilePicture, options: string, edges: number, distance: number): number[] {

@@ -3,18 +3,33 @@ import { TINT_OPACITY, DIM_GREY, type DrawStyles } from "../drawStyle";
 import type { ShadingOptions, TileLight } from "./shadingOptions";
 import { computeTileLight } from "./tileLight";
 import { forEachHidden } from "./mask";
-import { forEachStyled, forEachHighlighted, packRgba, makeLightMixer, type TileNeighbours, type TileLayers, type StylesById } from "./shadeTile";
+import {
+  forEachStyled,
+  forEachHighlighted,
+  packRgba,
+  makeLightMixer,
+  type TileNeighbours,
+  type TileLayers,
+  type StylesById,
+} from "./shadeTile";
 
 /**
  * Shades a colour tile by compositing alone, for browsers that do not return pixels exactly. Light
  * multiplies sRGB values by its 2.2nd root, which stays within a few bytes of the result in linear light.
  */
-export function composeTile(options: ShadingOptions, bitmap: ImageBitmap, layers: TileLayers, neighbours: TileNeighbours, { colors, styles }: StylesById): ImageBitmap {
+export function composeTile(
+  options: ShadingOptions,
+  bitmap: ImageBitmap,
+  layers: TileLayers,
+  neighbours: TileNeighbours,
+  { colors, styles }: StylesById,
+): ImageBitmap {
   const { width, height } = layers;
   const context = makeContext(width, height);
   context.drawImage(bitmap, 0, 0);
   const hidden = styles && layers.id ? applyStyles(context, layers.id, styles) : null;
-  if (options.light && layers.lightLayers) applyLight(context, options.light, computeTileLight(options.light, width, height, layers.lightLayers, neighbours.lightLayers));
+  if (options.light && layers.lightLayers)
+    applyLight(context, options.light, computeTileLight(options.light, width, height, layers.lightLayers, neighbours.lightLayers));
   context.globalCompositeOperation = "destination-in";
   context.drawImage(options.masked && layers.id ? makeImage(width, height, (at) => (layers.id?.[at] ? 0xff000000 : 0)) : bitmap, 0, 0);
   if (hidden) {
@@ -26,7 +41,11 @@ export function composeTile(options: ShadingOptions, bitmap: ImageBitmap, layers
     const behind = new Uint32Array(width * height);
     forEachHidden(width, height, layers.depth, neighbours.masks, (at) => (behind[at] = 0xff000000));
     context.globalCompositeOperation = "destination-out";
-    context.drawImage(makeImage(width, height, (at) => behind[at] ?? 0), 0, 0);
+    context.drawImage(
+      makeImage(width, height, (at) => behind[at] ?? 0),
+      0,
+      0,
+    );
   }
   return context.canvas.transferToImageBitmap();
 }
@@ -37,15 +56,28 @@ function applyStyles(context: OffscreenCanvasRenderingContext2D, id: Uint32Array
   const [paints, pale, hidden] = [new Uint32Array(id.length), new Uint32Array(id.length), new Uint32Array(id.length)];
   forEachStyled(id, styles, (at, word) => {
     const kind = word >>> 24;
-    (kind === 1 ? paints : kind === 3 ? pale : hidden)[at] = kind === 1 ? (word | 0xff000000) >>> 0 : packRgba([DIM_GREY[0], DIM_GREY[0], DIM_GREY[0]]);
+    (kind === 1 ? paints : kind === 3 ? pale : hidden)[at] =
+      kind === 1 ? (word | 0xff000000) >>> 0 : packRgba([DIM_GREY[0], DIM_GREY[0], DIM_GREY[0]]);
   });
   const greyCopy = makeGreyCopy(context.canvas);
   greyCopy.globalCompositeOperation = "destination-in";
-  greyCopy.drawImage(makeImage(width, height, (at) => pale[at] ?? 0), 0, 0);
+  greyCopy.drawImage(
+    makeImage(width, height, (at) => pale[at] ?? 0),
+    0,
+    0,
+  );
   context.globalCompositeOperation = "source-atop";
   drawOver(context, greyCopy.canvas, 1);
-  drawOver(context, makeImage(width, height, (at) => pale[at] ?? 0), DIM_GREY[1]);
-  drawOver(context, makeImage(width, height, (at) => paints[at] ?? 0), TINT_OPACITY);
+  drawOver(
+    context,
+    makeImage(width, height, (at) => pale[at] ?? 0),
+    DIM_GREY[1],
+  );
+  drawOver(
+    context,
+    makeImage(width, height, (at) => paints[at] ?? 0),
+    TINT_OPACITY,
+  );
   return makeImage(width, height, (at) => hidden[at] ?? 0);
 }
 
@@ -66,21 +98,39 @@ function applyLight(context: OffscreenCanvasRenderingContext2D, light: TileLight
   const { width, height } = context.canvas;
   const roots = ([0, 1, 2] as const).map((channel) => {
     const strength = makeLightMixer(light, channel);
-    return Float32Array.from({ length: width * height }, (_, at) => strength(shares[2 * at] as number, shares[2 * at + 1] as number) ** (1 / 2.2));
+    return Float32Array.from(
+      { length: width * height },
+      (_, at) => strength(shares[2 * at] as number, shares[2 * at + 1] as number) ** (1 / 2.2),
+    );
   });
-  const wordOf = (at: number, byte: (root: number) => number): number => packRgba(roots.map((root) => byte(root[at] ?? 1)) as unknown as Rgb);
+  const wordOf = (at: number, byte: (root: number) => number): number =>
+    packRgba(roots.map((root) => byte(root[at] ?? 1)) as unknown as Rgb);
   // Draws partly covered pixels over themselves until they are opaque with the same colour, as blending needs.
   context.globalCompositeOperation = "source-over";
   for (let k = 0; k < 8; k++) context.drawImage(context.canvas, 0, 0);
   context.globalCompositeOperation = "multiply";
-  context.drawImage(makeImage(width, height, (at) => wordOf(at, (root) => Math.min(root, 1))), 0, 0);
+  context.drawImage(
+    makeImage(width, height, (at) => wordOf(at, (root) => Math.min(root, 1))),
+    0,
+    0,
+  );
   if (!roots.some((channel) => channel.some((root) => root > 1))) return;
   context.globalCompositeOperation = "color-dodge";
-  context.drawImage(makeImage(width, height, (at) => wordOf(at, (root) => Math.max(1 - 1 / root, 0))), 0, 0);
+  context.drawImage(
+    makeImage(width, height, (at) => wordOf(at, (root) => Math.max(1 - 1 / root, 0))),
+    0,
+    0,
+  );
 }
 
 /** Draws tint × (½ + 0.65 grey) over 28 % of the colour, and the opaque rim on top. */
-function applyHighlights(context: OffscreenCanvasRenderingContext2D, options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, colors: ReadonlyMap<number, Rgb>): void {
+function applyHighlights(
+  context: OffscreenCanvasRenderingContext2D,
+  options: ShadingOptions,
+  layers: TileLayers,
+  neighbours: TileNeighbours,
+  colors: ReadonlyMap<number, Rgb>,
+): void {
   const { width, height } = layers;
   const [bodies, rims] = [new Uint32Array(width * height), new Uint32Array(width * height)];
   forEachHighlighted(options, layers, neighbours, colors, (at, color, rim) => {
@@ -99,7 +149,11 @@ function applyHighlights(context: OffscreenCanvasRenderingContext2D, options: Sh
   context.globalCompositeOperation = "source-atop";
   drawOver(context, body.canvas, 0.72);
   context.globalCompositeOperation = "source-over";
-  drawOver(context, makeImage(width, height, (at) => rims[at] ?? 0), 1);
+  drawOver(
+    context,
+    makeImage(width, height, (at) => rims[at] ?? 0),
+    1,
+  );
 }
 
 function makeGreyCopy(canvas: OffscreenCanvas): OffscreenCanvasRenderingContext2D {

@@ -30,10 +30,15 @@ export class CanvasCompositor implements Compositor {
   /** @param lost called when the browser has lost the content  @throws DrawError */
   constructor(canvas: HTMLCanvasElement, lost: () => void) {
     this.#context = getContext2d(canvas);
-    for (const each of [canvas, this.#mosaic.canvas]) each.addEventListener("contextrestored", () => {
-      this.#mosaic.invalidate();
-      lost();
-    }, { signal: this.#listeners.signal });
+    for (const each of [canvas, this.#mosaic.canvas])
+      each.addEventListener(
+        "contextrestored",
+        () => {
+          this.#mosaic.invalidate();
+          lost();
+        },
+        { signal: this.#listeners.signal },
+      );
   }
 
   get element(): HTMLElement {
@@ -98,7 +103,9 @@ export class CssCompositor implements Compositor {
   }
 
   show(screen: FrameState, passes: readonly ComposedPass[]): void {
-    passes.forEach((pass, k) => { this.#show(screen, pass, this.#getLayer(k)); });
+    passes.forEach((pass, k) => {
+      this.#show(screen, pass, this.#getLayer(k));
+    });
     for (const { box, mosaic } of this.#layers.splice(passes.length)) {
       box.remove();
       mosaic.empty();
@@ -110,13 +117,25 @@ export class CssCompositor implements Compositor {
     for (const { mosaic } of this.#layers) mosaic.empty();
   }
 
-  #show(screen: FrameState, { grid, tiles, smooth, opacity, clip }: ComposedPass, { box, mosaic }: { box: HTMLElement; mosaic: TileMosaic }): void {
+  #show(
+    screen: FrameState,
+    { grid, tiles, smooth, opacity, clip }: ComposedPass,
+    { box, mosaic }: { box: HTMLElement; mosaic: TileMosaic },
+  ): void {
     const [x, y] = mosaic.update(screen, grid, tiles, smooth, MARGIN_PX) ?? [0, 0];
     const [scale, css] = [grid.px / screen.dpr, (at: number): string => `${String(at / screen.dpr)}px`];
     const { canvas } = mosaic;
-    Object.assign(canvas.style, { width: `${String(canvas.width)}px`, height: `${String(canvas.height)}px`, transform: `translate(${css(grid.left + x * grid.px)}, ${css(grid.top + y * grid.px)}) scale(${String(scale)})`, imageRendering: smooth ? "auto" : "pixelated" });
+    Object.assign(canvas.style, {
+      width: `${String(canvas.width)}px`,
+      height: `${String(canvas.height)}px`,
+      transform: `translate(${css(grid.left + x * grid.px)}, ${css(grid.top + y * grid.px)}) scale(${String(scale)})`,
+      imageRendering: smooth ? "auto" : "pixelated",
+    });
     const [left, top, right, bottom] = computeClip(clip ?? [0, 0, 1, 1], screen);
-    Object.assign(box.style, { opacity: String(opacity), clipPath: clip ? `inset(${css(top)} ${css(screen.width - right)} ${css(screen.height - bottom)} ${css(left)})` : "" });
+    Object.assign(box.style, {
+      opacity: String(opacity),
+      clipPath: clip ? `inset(${css(top)} ${css(screen.width - right)} ${css(screen.height - bottom)} ${css(left)})` : "",
+    });
   }
 
   #getLayer(k: number): { box: HTMLElement; mosaic: TileMosaic } {

@@ -18,13 +18,26 @@ export interface Mask {
 }
 
 /** Computes how a tile of another layer overlaps a tile; null when it does not. */
-export function makeMask(own: DepthMapping, tile: Tile, other: DepthMapping, above: Tile, names: Pick<Mask, "depth" | "color">): Mask | null {
+export function makeMask(
+  own: DepthMapping,
+  tile: Tile,
+  other: DepthMapping,
+  above: Tile,
+  names: Pick<Mask, "depth" | "color">,
+): Mask | null {
   const [[u, v, px], [otherU, otherV, otherPx]] = [computeCorner(own, tile), computeCorner(other, above)];
   const [side, otherSide] = [own.frame.tilePx * px, other.frame.tilePx * otherPx];
   if (u + side <= otherU || otherU + otherSide <= u || v - side >= otherV || otherV - otherSide >= v) return null;
   const step = px / otherPx;
   const at = (from: number): number => from / otherPx + step / 2;
-  return { ...names, x: at(u - otherU), y: at(otherV - v), step, unit: own.unit_m / other.unit_m, first: (computeDepthAtZero(own) - computeDepthAtZero(other)) / other.unit_m };
+  return {
+    ...names,
+    x: at(u - otherU),
+    y: at(otherV - v),
+    step,
+    unit: own.unit_m / other.unit_m,
+    first: (computeDepthAtZero(own) - computeDepthAtZero(other)) / other.unit_m,
+  };
 }
 
 /** The layers of a mask in the worker; rows from the top. */
@@ -38,7 +51,13 @@ export interface MaskLayers {
 }
 
 /** Calls `act` for each pixel hidden by another layer. A partly covered pixel without a depth takes the least depth around it. */
-export function forEachHidden(width: number, height: number, depth: Uint32Array, masks: readonly MaskLayers[], act: (at: number) => void): void {
+export function forEachHidden(
+  width: number,
+  height: number,
+  depth: Uint32Array,
+  masks: readonly MaskLayers[],
+  act: (at: number) => void,
+): void {
   const depthAt = makeDepthReader(width, depth);
   for (const { mask, depth: other, color, ...size } of masks) {
     for (let j = 0; j < height; j++) {

@@ -20,6 +20,4 @@ export interface ShadeRequest {
 
 export type ShadeMessage = { readonly put: string; readonly value: WorkerValue } | { readonly drop: string } | ShadeRequest;
 
-export type ShadeResponse =
-  | { readonly ticket: number; readonly picture: TileImage }
-  | { readonly ticket: number; readonly error: string };
+export type ShadeResponse = { readonly ticket: number; readonly picture: TileImage } | { readonly ticket: number; readonly error: string };

@@ -58,14 +58,24 @@ function toSrgb(c: number): number {
   return c <= 0.0031308 ? c * 12.92 : 1.055 * c ** (1 / 2.4) - 0.055;
 }
 
-function paintColors(out: Bytes, options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, styles: DrawStyles | undefined): void {
+function paintColors(
+  out: Bytes,
+  options: ShadingOptions,
+  layers: TileLayers,
+  neighbours: TileNeighbours,
+  styles: DrawStyles | undefined,
+): void {
   const { color = out, id } = layers;
   out.set(color);
   for (let at = 0; options.masked && id && at < id.length; at++) out[4 * at + 3] = id[at] === 0 ? 0 : 255;
   if (styles && id) applyStyles(out, id, styles);
   if (!options.light || !layers.lightLayers) return;
   const shares = computeTileLight(options.light, layers.width, layers.height, layers.lightLayers, neighbours.lightLayers);
-  const [red, green, blue] = ([0, 1, 2] as const).map((channel) => makeLightMixer(options.light as TileLight, channel)) as [LightMixer, LightMixer, LightMixer];
+  const [red, green, blue] = ([0, 1, 2] as const).map((channel) => makeLightMixer(options.light as TileLight, channel)) as [
+    LightMixer,
+    LightMixer,
+    LightMixer,
+  ];
   for (let at = 0, k = 0; at < shares.length; at += 2, k += 4) {
     const [sky, sun] = [shares[at] as number, shares[at + 1] as number];
     out[k] = lightByte(out[k] as number, red(sky, sun));
@@ -80,7 +90,11 @@ function applyStyles(out: Bytes, id: Uint32Array, styles: DrawStyles): void {
     const k = 4 * at;
     const kind = word >>> 24;
     if (kind === 4) out[k + 3] = 0;
-    const grey = kind === 3 ? (0.2126 * (out[k] as number) + 0.7152 * (out[k + 1] as number) + 0.0722 * (out[k + 2] as number)) * (1 - DIM_GREY[1]) + 255 * DIM_GREY[0] * DIM_GREY[1] : 0;
+    const grey =
+      kind === 3
+        ? (0.2126 * (out[k] as number) + 0.7152 * (out[k + 1] as number) + 0.0722 * (out[k + 2] as number)) * (1 - DIM_GREY[1]) +
+          255 * DIM_GREY[0] * DIM_GREY[1]
+        : 0;
     for (let c = 0; c < 3 && (kind === 1 || kind === 3); c++) {
       const own = out[k + c] as number;
       out[k + c] = kind === 3 ? grey : own + (((word >> (8 * c)) & 255) - own) * TINT_OPACITY;
@@ -158,7 +172,13 @@ function paintDepths(out: Bytes, { depth }: TileLayers, [first, last]: readonly 
   }
 }
 
-function paintHighlights(out: Bytes, options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, colors: ReadonlyMap<number, Rgb>): void {
+function paintHighlights(
+  out: Bytes,
+  options: ShadingOptions,
+  layers: TileLayers,
+  neighbours: TileNeighbours,
+  colors: ReadonlyMap<number, Rgb>,
+): void {
   forEachHighlighted(options, layers, neighbours, colors, (at, tint, rim) => {
     const k = 4 * at;
     const [r, g, b] = out[k + 3] === 0 ? [0, 0, 0] : [out[k] as number, out[k + 1] as number, out[k + 2] as number];
@@ -172,7 +192,13 @@ function paintHighlights(out: Bytes, options: ShadingOptions, layers: TileLayers
 }
 
 /** Calls `act` for each highlighted pixel with its index, its colour, and whether it is near another object. */
-export function forEachHighlighted(options: ShadingOptions, layers: TileLayers, neighbours: TileNeighbours, colors: ReadonlyMap<number, Rgb>, act: (at: number, tint: Rgb, rim: boolean) => void): void {
+export function forEachHighlighted(
+  options: ShadingOptions,
+  layers: TileLayers,
+  neighbours: TileNeighbours,
+  colors: ReadonlyMap<number, Rgb>,
+  act: (at: number, tint: Rgb, rim: boolean) => void,
+): void {
   const { width, height, id } = layers;
   if (!id) return;
   const idAt = makeIdReader(width, height, id, neighbours.id);
@@ -184,7 +210,8 @@ export function forEachHighlighted(options: ShadingOptions, layers: TileLayers, 
       const own = id[at] as number;
       if (own === 0) continue;
       if (own !== last) [last, tint] = [own, colors.get(own)];
-      if (tint) act(at, tint, idAt(x + more, y) !== own || idAt(x + less, y) !== own || idAt(x, y + more) !== own || idAt(x, y + less) !== own);
+      if (tint)
+        act(at, tint, idAt(x + more, y) !== own || idAt(x + less, y) !== own || idAt(x, y + more) !== own || idAt(x, y + less) !== own);
     }
   }
 }
@@ -193,12 +220,19 @@ export function forEachHighlighted(options: ShadingOptions, layers: TileLayers, 
 const GUTTER_PX = 2;
 
 /** Returns a function that reads ids, also beyond one edge of the tile; without a neighbour there, it repeats the edge. */
-function makeIdReader(width: number, height: number, id: Uint32Array, [left, right, above, below]: Neighbours<Uint32Array>): (x: number, y: number) => number {
+function makeIdReader(
+  width: number,
+  height: number,
+  id: Uint32Array,
+  [left, right, above, below]: Neighbours<Uint32Array>,
+): (x: number, y: number) => number {
   return (x, y) => {
     if (x < 0) return left ? (left[y * width + width + Math.max(x, -GUTTER_PX)] as number) : (id[y * width] as number);
-    if (x >= width) return right ? (right[y * width + Math.min(x - width, GUTTER_PX - 1)] as number) : (id[y * width + width - 1] as number);
+    if (x >= width)
+      return right ? (right[y * width + Math.min(x - width, GUTTER_PX - 1)] as number) : (id[y * width + width - 1] as number);
     if (y < 0) return above ? (above[(height + Math.max(y, -GUTTER_PX)) * width + x] as number) : (id[x] as number);
-    if (y >= height) return below ? (below[Math.min(y - height, GUTTER_PX - 1) * width + x] as number) : (id[(height - 1) * width + x] as number);
+    if (y >= height)
+      return below ? (below[Math.min(y - height, GUTTER_PX - 1) * width + x] as number) : (id[(height - 1) * width + x] as number);
     return id[y * width + x] as number;
   };
 }

@@ -8,7 +8,10 @@ import type { ShadeMessage, ShadeRequest, ShadeResponse, TileImage, WorkerValue 
 import { shadeTile, type TileNeighbours, type TileLayers } from "./shadeTile";
 import { composeTile } from "./composeTile";
 
-const scope = self as unknown as { onmessage: (event: MessageEvent<ShadeMessage>) => void; postMessage: (response: ShadeResponse, transfer?: Transferable[]) => void };
+const scope = self as unknown as {
+  onmessage: (event: MessageEvent<ShadeMessage>) => void;
+  postMessage: (response: ShadeResponse, transfer?: Transferable[]) => void;
+};
 
 const values = new Map<string, WorkerValue>();
 /** Pixels of colour tiles that have been read back. */
@@ -50,7 +53,9 @@ function answer({ ticket, options, layers, neighbours }: ShadeRequest): void {
 function paint(options: ShadingOptions, names: ShadeRequest["layers"], neighbourNames: ShadeRequest["neighbours"]): TileImage {
   const pictured = names.color ?? names.picture;
   const color = findTile(pictured);
-  const { width, height } = [color, findTile(names.normal), findTile(names.id), findTile(names.depth)].find((value) => value !== undefined) ?? { width: 0, height: 0 };
+  const { width, height } = [color, findTile(names.normal), findTile(names.id), findTile(names.depth)].find(
+    (value) => value !== undefined,
+  ) ?? { width: 0, height: 0 };
   const bitmap = color && "bitmap" in color ? color.bitmap : undefined;
   const lightLayers = loadLightLayers(options, names.normal, names.ao, names[options.light?.shadow?.kind ?? "sun"]);
   const layers: TileLayers = {
@@ -62,10 +67,15 @@ function paint(options: ShadingOptions, names: ShadeRequest["layers"], neighbour
     depth: loadValues(names.depth),
   };
   const shadow = neighbourNames[options.light?.shadow?.kind ?? "sun"];
-  const neighbours: TileNeighbours = { lightLayers: (neighbourNames.normal ?? []).map((name, k) => loadLightLayers(options, name, neighbourNames.ao?.[k], shadow?.[k])), id: (neighbourNames.id ?? []).map(loadValues), masks: options.masks.flatMap(loadMask) };
+  const neighbours: TileNeighbours = {
+    lightLayers: (neighbourNames.normal ?? []).map((name, k) => loadLightLayers(options, name, neighbourNames.ao?.[k], shadow?.[k])),
+    id: (neighbourNames.id ?? []).map(loadValues),
+    masks: options.masks.flatMap(loadMask),
+  };
   const colors = options.highlight === null ? undefined : (values.get(options.highlight) as ReadonlyMap<number, Rgb> | undefined);
   const styles = options.styles === null ? undefined : (values.get(options.styles) as DrawStyles | undefined);
-  if (bitmap && !readsExactly && options.mode !== "id" && options.mode !== "normal" && options.mode !== "depth") return composeTile(options, bitmap, layers, neighbours, { colors, styles });
+  if (bitmap && !readsExactly && options.mode !== "id" && options.mode !== "normal" && options.mode !== "depth")
+    return composeTile(options, bitmap, layers, neighbours, { colors, styles });
   return new ImageData(shadeTile(options, layers, neighbours, { colors, styles }), width, height);
 }
 
@@ -82,10 +92,19 @@ function findTile(name: string | undefined): TileData | undefined {
 }
 
 /** Collects the layers that light a tile; undefined when a required one is missing. */
-function loadLightLayers({ light }: ShadingOptions, normal: string | undefined, ao: string | undefined, shadow: string | undefined): LightLayers | undefined {
+function loadLightLayers(
+  { light }: ShadingOptions,
+  normal: string | undefined,
+  ao: string | undefined,
+  shadow: string | undefined,
+): LightLayers | undefined {
   const [n, o, s] = [findTile(normal), light?.occlusion ? findTile(ao) : undefined, light?.shadow ? findTile(shadow) : undefined];
   if (n?.kind !== "normal" || (light?.occlusion && o?.kind !== "ao") || (light?.shadow && s?.kind !== light.shadow.kind)) return undefined;
-  return { normal: n.values, ao: o?.kind === "ao" ? o.values : undefined, shadow: s?.kind === "sun" || s?.kind === "sun16" ? s.values : undefined };
+  return {
+    normal: n.values,
+    ao: o?.kind === "ao" ? o.values : undefined,
+    shadow: s?.kind === "sun" || s?.kind === "sun16" ? s.values : undefined,
+  };
 }
 
 function loadValues(name: string | undefined): Uint32Array | undefined {

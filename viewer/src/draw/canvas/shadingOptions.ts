@@ -38,7 +38,11 @@ export interface ShadingOptions {
 /** Lists the layers that a picture uses. Without ids neither highlights nor styles are shown. */
 export function listKinds(options: ShadingOptions): LayerKind[] {
   const needed = listRequiredKinds(options.mode, options.masked, options.combined);
-  return [...needed, ...listBakedKinds(options), ...((options.highlight !== null || options.styles !== null) && !needed.includes("id") ? ["id" as const] : [])];
+  return [
+    ...needed,
+    ...listBakedKinds(options),
+    ...((options.highlight !== null || options.styles !== null) && !needed.includes("id") ? ["id" as const] : []),
+  ];
 }
 
 /** Lists the layers of baked light; missing ones are skipped. */
@@ -49,13 +53,20 @@ function listBakedKinds({ light }: ShadingOptions): LayerKind[] {
 /** Restricts the options to the layers that are loaded. */
 export function restrictOptions(options: ShadingOptions, has: (kind: LayerKind) => boolean): ShadingOptions {
   const { light, highlight, styles } = options;
-  const tileLight = light && { ...light, occlusion: light.occlusion && has("ao"), shadow: light.shadow && has(light.shadow.kind) ? light.shadow : null };
+  const tileLight = light && {
+    ...light,
+    occlusion: light.occlusion && has("ao"),
+    shadow: light.shadow && has(light.shadow.kind) ? light.shadow : null,
+  };
   return { ...options, light: tileLight, highlight: has("id") ? highlight : null, styles: has("id") ? styles : null };
 }
 
 /** Lists the layers whose pixels beyond the tile's edges matter. */
 export function listNeighbourKinds(options: ShadingOptions): LayerKind[] {
-  return [...(options.light ? ["normal" as const, ...listBakedKinds(options)] : []), ...(options.highlight === null ? [] : ["id" as const])];
+  return [
+    ...(options.light ? ["normal" as const, ...listBakedKinds(options)] : []),
+    ...(options.highlight === null ? [] : ["id" as const]),
+  ];
 }
 
 /** Names of a pass's highlight colours and styles in the worker. */
@@ -65,7 +76,12 @@ export interface IdTableNames {
 }
 
 /** Makes the options for a tile of a pass. @param scale texels per device pixel */
-export function makeShadingOptions({ light, dpr }: Pick<FrameContent, "light" | "dpr">, pass: LayerPass, scale: number, { highlight, styles }: IdTableNames): ShadingOptions {
+export function makeShadingOptions(
+  { light, dpr }: Pick<FrameContent, "light" | "dpr">,
+  pass: LayerPass,
+  scale: number,
+  { highlight, styles }: IdTableNames,
+): ShadingOptions {
   const mode = pass.mode === "lit" && !light.lit ? "color" : pass.mode;
   const colored = mode === "lit" || mode === "color" || mode === "picture";
   return {
@@ -88,7 +104,12 @@ function makeTileLight(light: Readonly<Light>, { shadow, occlusion }: BakedLight
     sky: scaled(light.sky_rgb, light.ambient),
     beam: scaled(light.sun_rgb, light.diffuse),
     occlusion,
-    shadow: shadow && { kind: shadow.layer.kind === "sun" ? "sun" : "sun16", first: shadow.first, second: shadow.second, share: shadow.share },
+    shadow: shadow && {
+      kind: shadow.layer.kind === "sun" ? "sun" : "sun16",
+      first: shadow.first,
+      second: shadow.second,
+      share: shadow.share,
+    },
   };
 }
 

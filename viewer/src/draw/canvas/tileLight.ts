@@ -1,6 +1,5 @@
 import type { TileLight } from "./shadingOptions";
 
-
 /** The layers of a tile that light it, all of the same size. */
 export interface LightLayers {
   /** RGB8 */
@@ -15,7 +14,13 @@ export interface LightLayers {
  * neighbour's, like the shader (draw/webgl/shader.ts explains why). Where a neighbouring tile is missing, uses the pixel's own light.
  * @param neighbours tiles to the left, to the right, above and below  @returns a buffer that is valid until the next call
  */
-export function computeTileLight(light: TileLight, width: number, height: number, layers: LightLayers, neighbours: readonly (LightLayers | undefined)[]): Float32Array {
+export function computeTileLight(
+  light: TileLight,
+  width: number,
+  height: number,
+  layers: LightLayers,
+  neighbours: readonly (LightLayers | undefined)[],
+): Float32Array {
   const wide = width + 2;
   const own = (buffers[0] = resizeBuffer(buffers[0], 2 * wide * (height + 2))).fill(NONE);
   const row = makeRowLighter(light, own);

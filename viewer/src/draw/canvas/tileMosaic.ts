@@ -19,13 +19,23 @@ export interface Grid {
 export function makeGrid({ quads: [quad], level }: LayerPass, tilePx: number): Grid | null {
   if (!quad) return null;
   const side = tilePx / quad.scale;
-  return { level, tilePx, left: quad.origin[0] - quad.from.x * side, top: quad.origin[1] - quad.from.y * side, px: 2 ** (quad.from.z - level) / quad.scale };
+  return {
+    level,
+    tilePx,
+    left: quad.origin[0] - quad.from.x * side,
+    top: quad.origin[1] - quad.from.y * side,
+    px: 2 ** (quad.from.z - level) / quad.scale,
+  };
 }
 
 /** Finds the tile that covers a rectangle of the screen. */
 export function findArea({ level, tilePx, left, top, px }: Grid, [x0, y0, x1]: readonly number[]): Tile {
   const side = (x1 ?? 0) - (x0 ?? 0);
-  return { z: level + Math.round(Math.log2((tilePx * px) / side)), x: Math.round(((x0 ?? 0) - left) / side), y: Math.round(((y0 ?? 0) - top) / side) };
+  return {
+    z: level + Math.round(Math.log2((tilePx * px) / side)),
+    x: Math.round(((x0 ?? 0) - left) / side),
+    y: Math.round(((y0 ?? 0) - top) / side),
+  };
 }
 
 /** Computes a tile's window: integers, and the same for an edge whichever tile it belongs to. */
@@ -79,8 +89,13 @@ export class TileMosaic {
   update(screen: ScreenSize, grid: Grid, tiles: readonly MosaicTile[], smooth: boolean, margin: number): PixelWindow | null {
     const visible = computeVisibleWindow(screen, grid, 0);
     if (!visible) return this.empty();
-    const content = this.#content && containsWindow(this.#content, visible, grid, smooth) ? this.#content : this.#restart(grid, smooth, computeVisibleWindow(screen, grid, margin) ?? visible);
-    const wanted = new Map(tiles.filter(({ area }) => intersects(computeWindow(grid, area), content.window)).map((tile) => [makeKey(tile), tile]));
+    const content =
+      this.#content && containsWindow(this.#content, visible, grid, smooth)
+        ? this.#content
+        : this.#restart(grid, smooth, computeVisibleWindow(screen, grid, margin) ?? visible);
+    const wanted = new Map(
+      tiles.filter(({ area }) => intersects(computeWindow(grid, area), content.window)).map((tile) => [makeKey(tile), tile]),
+    );
     for (const [key, { area }] of content.tiles) {
       if (wanted.has(key)) continue;
       this.#clear(grid, area);
@@ -149,7 +164,17 @@ export class TileMosaic {
     context.beginPath();
     context.rect(x0, y0, x1 - x0, y1 - y0);
     context.clip();
-    context.drawImage(image, left, top, right - left, bottom - top, x0 + (left - u) * scale, y0 + (top - v) * scale, (right - left) * scale, (bottom - top) * scale);
+    context.drawImage(
+      image,
+      left,
+      top,
+      right - left,
+      bottom - top,
+      x0 + (left - u) * scale,
+      y0 + (top - v) * scale,
+      (right - left) * scale,
+      (bottom - top) * scale,
+    );
     context.restore();
   }
 }
@@ -180,7 +205,10 @@ export function getContext2d(canvas: HTMLCanvasElement): CanvasRenderingContext2
 function computeVisibleWindow({ width, height }: ScreenSize, { level, tilePx, left, top, px }: Grid, margin: number): PixelWindow | null {
   const side = tilePx * 2 ** level;
   const [x0, y0] = [left, top].map((at) => Math.max(0, Math.floor(-at / px) - margin) - 1) as [number, number];
-  const [x1, y1] = [Math.min(side, Math.ceil((width - left) / px) + margin) + 1, Math.min(side, Math.ceil((height - top) / px) + margin) + 1];
+  const [x1, y1] = [
+    Math.min(side, Math.ceil((width - left) / px) + margin) + 1,
+    Math.min(side, Math.ceil((height - top) / px) + margin) + 1,
+  ];
   return x1 - x0 > 2 && y1 - y0 > 2 ? [x0, y0, x1, y1] : null;
 }
 
@@ -188,6 +216,12 @@ const intersects = (a: PixelWindow, b: PixelWindow): boolean => a[0] < b[2] && a
 
 /** Whether the content covers the visible window on the same grid. */
 const containsWindow = ({ grid, smooth, window }: MosaicContent, visible: PixelWindow, now: Grid, smoothNow: boolean): boolean =>
-  grid.level === now.level && grid.tilePx === now.tilePx && smooth === smoothNow && visible[0] >= window[0] && visible[1] >= window[1] && visible[2] <= window[2] && visible[3] <= window[3];
+  grid.level === now.level &&
+  grid.tilePx === now.tilePx &&
+  smooth === smoothNow &&
+  visible[0] >= window[0] &&
+  visible[1] >= window[1] &&
+  visible[2] <= window[2] &&
+  visible[3] <= window[3];
 
 const makeKey = ({ area }: MosaicTile): string => `${String(area.z)}/${String(area.x)}/${String(area.y)}`;

@@ -80,7 +80,8 @@ export class TilePictures {
   /** Replaces the waiting requests. */
   setRequests(requests: PictureRequest[]): void {
     const running = new Map([...this.#running.values()].map((request) => [request.picture, request]));
-    const isOutdated = ({ picture, options, edges }: PictureRequest): boolean => running.get(picture)?.options !== options || ((running.get(picture)?.edges ?? 0) & edges) !== edges;
+    const isOutdated = ({ picture, options, edges }: PictureRequest): boolean =>
+      running.get(picture)?.options !== options || ((running.get(picture)?.edges ?? 0) & edges) !== edges;
     this.#waiting = this.#stopped ? [] : requests.filter(isOutdated).sort((a, b) => compare(a.urgency, b.urgency));
     this.#fill();
   }
@@ -133,7 +134,11 @@ export class TilePictures {
     };
     worker.onerror = (event) => {
       this.stop();
-      this.#events.failed(new DrawError(`cannot shade tiles: ${event.message || "the worker is blocked; add worker-src blob: to the page's Content-Security-Policy"}`));
+      this.#events.failed(
+        new DrawError(
+          `cannot shade tiles: ${event.message || "the worker is blocked; add worker-src blob: to the page's Content-Security-Policy"}`,
+        ),
+      );
     };
     return worker;
   }

@@ -15,7 +15,12 @@ export class IdTextures {
   }
 
   /** Binds a table, made from the values if it is new. @param uniforms sampler, mask and probes  @param pack converts a value to uint32 */
-  bind<V>(program: Program, [sampler, mask, probes]: readonly ["u_table" | "u_styles", string, string], values: ReadonlyMap<number, V>, pack: (value: V) => number): void {
+  bind<V>(
+    program: Program,
+    [sampler, mask, probes]: readonly ["u_table" | "u_styles", string, string],
+    values: ReadonlyMap<number, V>,
+    pack: (value: V) => number,
+  ): void {
     const gl = this.#gl;
     const { table, texture } = this.#known.get(values) ?? this.#upload(values, buildIdTable(values, pack));
     gl.activeTexture(gl.TEXTURE0 + textureUnit(sampler));

@@ -4,11 +4,20 @@ export class OffscreenTarget {
   readonly #framebuffer: WebGLFramebuffer;
   readonly #buffers: readonly WebGLRenderbuffer[];
 
-  constructor(gl: WebGL2RenderingContext, readonly width: number, readonly height: number) {
+  constructor(
+    gl: WebGL2RenderingContext,
+    readonly width: number,
+    readonly height: number,
+  ) {
     this.#gl = gl;
     this.#framebuffer = gl.createFramebuffer();
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.#framebuffer);
-    this.#buffers = ([[gl.RGBA8, gl.COLOR_ATTACHMENT0], [gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT]] as const).map(([format, attachment]) => {
+    this.#buffers = (
+      [
+        [gl.RGBA8, gl.COLOR_ATTACHMENT0],
+        [gl.DEPTH_COMPONENT24, gl.DEPTH_ATTACHMENT],
+      ] as const
+    ).map(([format, attachment]) => {
       const buffer = gl.createRenderbuffer();
       gl.bindRenderbuffer(gl.RENDERBUFFER, buffer);
       gl.renderbufferStorage(gl.RENDERBUFFER, format, width, height);

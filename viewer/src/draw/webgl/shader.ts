@@ -19,10 +19,30 @@ export interface ShaderVariant {
 }
 
 export const variantName = (v: ShaderVariant): string =>
-  [v.mode, v.masked && "masked", v.highlight && "highlight", v.styled && "styled", v.shadow, v.occlusion && "ao", v.combined && "combined", v.estimate && "estimated"].filter(Boolean).join("+");
+  [
+    v.mode,
+    v.masked && "masked",
+    v.highlight && "highlight",
+    v.styled && "styled",
+    v.shadow,
+    v.occlusion && "ao",
+    v.combined && "combined",
+    v.estimate && "estimated",
+  ]
+    .filter(Boolean)
+    .join("+");
 
 export function makeFragmentShader({ mode, masked, highlight, styled, shadow, occlusion, combined, estimate }: ShaderVariant): string {
-  const names = [`MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`, masked && "MASKED", highlight && "HIGHLIGHT", styled && "STYLED", shadow && `SHADOW_${shadow.toUpperCase()}`, occlusion && "OCCLUSION", combined && "COMBINED", estimate && "ESTIMATED"];
+  const names = [
+    `MODE_${mode === "picture" ? "COLOR" : mode.toUpperCase()}`,
+    masked && "MASKED",
+    highlight && "HIGHLIGHT",
+    styled && "STYLED",
+    shadow && `SHADOW_${shadow.toUpperCase()}`,
+    occlusion && "OCCLUSION",
+    combined && "COMBINED",
+    estimate && "ESTIMATED",
+  ];
   const defines = names.filter(Boolean).map((name) => `#define ${String(name)}`);
   return ["#version 300 es", ...defines, HEAD, ID_LOOKUP, DEPTH, estimate, COLOR, FALSE_COLOR, HIGHLIGHT, COMBINED, MAIN].join("\n");
 }

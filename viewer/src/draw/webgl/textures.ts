@@ -90,12 +90,17 @@ export class TileTextures {
     const gl = this.#gl;
     switch (kind) {
       case "color":
-      case "picture": return [gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE];
-      case "normal": return [gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE];
+      case "picture":
+        return [gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE];
+      case "normal":
+        return [gl.RGB8, gl.RGB, gl.UNSIGNED_BYTE];
       case "sun":
-      case "ao": return [gl.R8, gl.RED, gl.UNSIGNED_BYTE];
-      case "sun16": return [gl.R16UI, gl.RED_INTEGER, gl.UNSIGNED_SHORT];
-      default: return [gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT];
+      case "ao":
+        return [gl.R8, gl.RED, gl.UNSIGNED_BYTE];
+      case "sun16":
+        return [gl.R16UI, gl.RED_INTEGER, gl.UNSIGNED_SHORT];
+      default:
+        return [gl.R32UI, gl.RED_INTEGER, gl.UNSIGNED_INT];
     }
   }
 

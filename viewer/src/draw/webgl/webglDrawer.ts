@@ -2,7 +2,16 @@ import { DrawError } from "../../core/errors";
 import type { Vec2, Vec3 } from "../../core/vec";
 import { towardsLight } from "../../geo/light";
 import type { LayerKind } from "../../tiles/tileData";
-import { listBakedLightKinds, listRequiredKinds, type Drawer, type DrawerEvents, type FrameContent, type Mode, type LayerPass, type Quad } from "../drawer";
+import {
+  listBakedLightKinds,
+  listRequiredKinds,
+  type Drawer,
+  type DrawerEvents,
+  type FrameContent,
+  type Mode,
+  type LayerPass,
+  type Quad,
+} from "../drawer";
 import { computeDepthAtZero, computeCustomLayerBias, joinDepthRanges, computeMaxStep, type DepthMapping } from "../depthMapping";
 import { packColor, packStyle } from "../drawStyle";
 import type { Program } from "../lightEstimator";
@@ -12,7 +21,15 @@ import { IdTextures } from "./idTextures";
 import { computeReadableBounds, TileTextures, type TileTexture } from "./textures";
 
 const SAMPLERS = {
-  color: "u_color", picture: "u_color", normal: "u_normal", id: "u_id", depth: "u_depth", depth2: "u_depth", sun: "u_shadow", sun16: "u_shadow", ao: "u_ao",
+  color: "u_color",
+  picture: "u_color",
+  normal: "u_normal",
+  id: "u_id",
+  depth: "u_depth",
+  depth2: "u_depth",
+  sun: "u_shadow",
+  sun16: "u_shadow",
+  ao: "u_ao",
 } as const;
 
 /** The textures of a quad. */
@@ -49,7 +66,15 @@ export class WebGLDrawer implements Drawer {
 
   /** @throws DrawError when the browser has no WebGL2, or none on a GPU where that is required */
   constructor(canvas: HTMLCanvasElement, options: WebGLOptions, events: DrawerEvents) {
-    const settings: WebGLContextAttributes = { alpha: true, premultipliedAlpha: true, antialias: false, depth: false, stencil: false, preserveDrawingBuffer: options.preserve, failIfMajorPerformanceCaveat: options.requireGpu };
+    const settings: WebGLContextAttributes = {
+      alpha: true,
+      premultipliedAlpha: true,
+      antialias: false,
+      depth: false,
+      stencil: false,
+      preserveDrawingBuffer: options.preserve,
+      failIfMajorPerformanceCaveat: options.requireGpu,
+    };
     const gl = canvas.getContext("webgl2", settings);
     if (!gl) throw new DrawError("this browser does not support WebGL2; update it or enable hardware acceleration");
     if (options.requireGpu && isSoftware(gl)) {
@@ -74,7 +99,14 @@ export class WebGLDrawer implements Drawer {
     gl.disable(gl.CULL_FACE);
     const join = (depths: readonly DepthMapping[]): Vec2 | null => joinDepthRanges(depths, listCustomLayerRanges(frame));
     const estimator = frame.lighting?.estimator;
-    estimator?.update(gl, frame, () => join(frame.passes.flatMap(({ relief }) => relief ?? [])) as Vec2, (coarse, pass, range) => { this.#drawPass(coarse, pass, range, false); });
+    estimator?.update(
+      gl,
+      frame,
+      () => join(frame.passes.flatMap(({ relief }) => relief ?? [])) as Vec2,
+      (coarse, pass, range) => {
+        this.#drawPass(coarse, pass, range, false);
+      },
+    );
     const combined = frame.passes.filter(({ depths }) => depths);
     const range = frame.target?.range ?? estimator?.range ?? join(combined.flatMap(({ depths }) => depths ?? []));
     const bias = Math.max(0, ...combined.map(({ depths, level }) => (depths ? computeCustomLayerBias(depths.frame, level) : 0)));
@@ -88,7 +120,9 @@ export class WebGLDrawer implements Drawer {
     if (combined.length === 0) this.#drawCombined(frame, [], range);
     gl.disable(gl.SCISSOR_TEST);
     if (!frame.target) offscreen?.copyToCanvas();
-    this.#idTextures.freeAllBut(new Set(frame.passes.flatMap(({ highlight, drawStyles }) => [highlight, ...(drawStyles ? [drawStyles.byId] : [])])));
+    this.#idTextures.freeAllBut(
+      new Set(frame.passes.flatMap(({ highlight, drawStyles }) => [highlight, ...(drawStyles ? [drawStyles.byId] : [])])),
+    );
   }
 
   release(key: string): void {
@@ -153,7 +187,16 @@ export class WebGLDrawer implements Drawer {
       const has = (kind: LayerKind): boolean => bakedLight.some(([other]) => other === kind);
       const shadow = has("sun") ? "sun" : has("sun16") ? "sun16" : null;
       const styled = ids !== undefined && pass.drawStyles !== null;
-      const program = this.#programs.use({ mode, masked: pass.masked, highlight: ids !== undefined && pass.highlight.size > 0, styled, shadow, occlusion: has("ao"), combined: range !== null, estimate: (depth && estimator?.shader) ?? "" });
+      const program = this.#programs.use({
+        mode,
+        masked: pass.masked,
+        highlight: ids !== undefined && pass.highlight.size > 0,
+        styled,
+        shadow,
+        occlusion: has("ao"),
+        combined: range !== null,
+        estimate: (depth && estimator?.shader) ?? "",
+      });
       for (const [kind, texture] of [...textures, ...bakedLight]) this.#bind(kind, texture);
       if (depth && pass.relief && estimator?.range) {
         this.#bind("depth", depth);
@@ -162,14 +205,22 @@ export class WebGLDrawer implements Drawer {
       }
       if (range && pass.depths) this.#setDepths(program, pass.depths, quad, range, soft);
       if (ids) this.#bindIds(program, pass, quad, ids, frame.dpr);
-      this.#drawQuad(frame, pass, quad, program, [...textures, ...bakedLight, ["id", ids] as const, ["depth", depth] as const].flatMap(([, texture]) => texture ?? []));
+      this.#drawQuad(
+        frame,
+        pass,
+        quad,
+        program,
+        [...textures, ...bakedLight, ["id", ids] as const, ["depth", depth] as const].flatMap(([, texture]) => texture ?? []),
+      );
     }
   }
 
   #collectTextures(pass: LayerPass, mode: Mode, quad: Quad, shaded: boolean): QuadTextures {
     return {
       quad,
-      textures: listRequiredKinds(mode, pass.masked, pass.depths !== null).map((kind) => [kind, this.#getTexture(pass, kind, quad)] as const),
+      textures: listRequiredKinds(mode, pass.masked, pass.depths !== null).map(
+        (kind) => [kind, this.#getTexture(pass, kind, quad)] as const,
+      ),
       bakedLight: listBakedLightKinds(mode, pass.bakedLight).flatMap((kind) => {
         const texture = this.#getTexture(pass, kind, quad);
         return texture ? [[kind, texture] as const] : [];
@@ -230,7 +281,12 @@ export class WebGLDrawer implements Drawer {
       gl.disable(gl.SCISSOR_TEST);
       return;
     }
-    const [left, top, right, bottom] = [Math.round(clip[0] * width), Math.round(clip[1] * height), Math.round(clip[2] * width), Math.round(clip[3] * height)];
+    const [left, top, right, bottom] = [
+      Math.round(clip[0] * width),
+      Math.round(clip[1] * height),
+      Math.round(clip[2] * width),
+      Math.round(clip[3] * height),
+    ];
     gl.enable(gl.SCISSOR_TEST);
     gl.scissor(left, height - bottom, Math.max(0, right - left), Math.max(0, bottom - top));
   }
@@ -268,13 +324,16 @@ function isSoftware(gl: WebGL2RenderingContext): boolean {
   const renderer = String(gl.getParameter(gl.RENDERER));
   // WebKit hides the name behind this extension.
   const debugInfo = renderer === "WebKit WebGL" ? gl.getExtension("WEBGL_debug_renderer_info") : null;
-  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(debugInfo ? String(gl.getParameter(debugInfo.UNMASKED_RENDERER_WEBGL)) : renderer);
+  return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(
+    debugInfo ? String(gl.getParameter(debugInfo.UNMASKED_RENDERER_WEBGL)) : renderer,
+  );
 }
 
 /** Lists the ranges of D of a frame's custom layers. */
-const listCustomLayerRanges = ({ customLayers, camera }: FrameContent): Vec2[] => customLayers.flatMap((layer) => {
-  const range = layer.getDepthRange(camera.frame);
-  return range ? [range] : [];
-});
+const listCustomLayerRanges = ({ customLayers, camera }: FrameContent): Vec2[] =>
+  customLayers.flatMap((layer) => {
+    const range = layer.getDepthRange(camera.frame);
+    return range ? [range] : [];
+  });
 
 const scaled = ([x, y, z]: Vec3, by: number): Vec3 => [x * by, y * by, z * by];
