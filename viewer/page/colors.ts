@@ -1,5 +1,5 @@
-import type { AttributeInfo, imageLayer, map } from "./map3d.module.js";
-import type { theme } from "./map3d-theme.module.js";
+import type { AttributeInfo, ImageLayer, Map3D } from "./map3d.module.js";
+import type { Theme } from "./map3d-theme.module.js";
 import type { Permalink } from "./permalink";
 import { byId } from "./dom";
 import { toast } from "./toast";
@@ -10,18 +10,18 @@ const MAX_VALUES = 60;
 
 /** Colours objects by an attribute that the user selects. */
 export class Colors {
-  readonly #view: map;
-  #layer: imageLayer;
+  readonly #view: Map3D;
+  #layer: ImageLayer;
   readonly #permalink: Permalink;
   readonly #select = byId("color-by") as HTMLSelectElement;
-  #theme: theme | undefined;
+  #theme: Theme | undefined;
 
-  constructor(view: map, layer: imageLayer, permalink: Permalink) {
+  constructor(view: Map3D, layer: ImageLayer, permalink: Permalink) {
     [this.#view, this.#layer, this.#permalink] = [view, layer, permalink];
   }
 
   /** The active theme. */
-  get theme(): theme | undefined {
+  get theme(): Theme | undefined {
     return this.#theme;
   }
 
@@ -39,7 +39,7 @@ export class Colors {
   }
 
   /** Switches to another layer, coloured by its attribute of the same name. */
-  async setLayer(layer: imageLayer): Promise<void> {
+  async setLayer(layer: ImageLayer): Promise<void> {
     this.#layer = layer;
     this.#theme?.remove();
     this.#theme = undefined;

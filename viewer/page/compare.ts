@@ -1,4 +1,4 @@
-import { map, type ClickEvent, type imageLayer } from "./map3d.module.js";
+import { Map3D, type ClickEvent, type ImageLayer } from "./map3d.module.js";
 import { Haze } from "./haze";
 import { byId } from "./dom";
 import { report } from "./toast";
@@ -10,7 +10,7 @@ const ZOOM_OUT = -1;
 
 /** The view to compare with others around the same place. */
 export interface CompareContext {
-  readonly view: map;
+  readonly view: Map3D;
   /** Selects what was clicked in any of the maps. */
   readonly onClick: (event: ClickEvent) => void;
   /** Whether each map fades towards the edge of its content. */
@@ -21,9 +21,9 @@ export interface CompareContext {
 export class Compare {
   readonly #context: CompareContext;
   readonly #pitch_deg: number | undefined;
-  readonly #others: map[] = [];
+  readonly #others: Map3D[] = [];
   /** The layers of the page, and their copies in the other maps. */
-  readonly #copies: (readonly [layer: imageLayer, copy: imageLayer])[] = [];
+  readonly #copies: (readonly [layer: ImageLayer, copy: ImageLayer])[] = [];
   #end: (() => void) | undefined;
 
   constructor(context: CompareContext) {
@@ -32,15 +32,11 @@ export class Compare {
     this.#pitch_deg = pitches.find((pitch) => pitches.filter((other) => other === pitch).length >= TURNS_DEG.length);
     byId("compare").hidden = this.#pitch_deg === undefined;
     byId("compare").addEventListener("click", () => void this.#open().catch(report));
-    byId("end-compare").addEventListener("click", () => {
-      this.#close();
-    });
+    byId("end-compare").addEventListener("click", () => this.#close());
     addEventListener("keydown", ({ key }) => {
       if (key === "Escape" && !document.querySelector("dialog[open]")) this.#close();
     });
-    context.view.on("lightchange", () => {
-      this.#light();
-    });
+    context.view.on("lightchange", () => this.#light());
   }
 
   /** Highlights in all maps what is highlighted in the page's. */
@@ -50,7 +46,7 @@ export class Compare {
 
   async #open(): Promise<void> {
     const { view } = this.#context;
-    const { sync } = await import("./map3d-compare.module.js");
+    const { Sync } = await import("./map3d-compare.module.js");
     if (this.#end) return;
     document.body.classList.add("compares");
     const shown = view.directions.find(({ id }) => id === view.direction);
@@ -62,7 +58,7 @@ export class Compare {
     const zoom = view.zoom;
     view.setZoom(zoom + ZOOM_OUT);
     const zoomed = view.zoom - zoom;
-    const together = new sync([view, ...this.#others], { turns_deg: TURNS_DEG, captions: true });
+    const together = new Sync([view, ...this.#others], { turns_deg: TURNS_DEG, captions: true });
     this.#end = () => {
       together.remove();
       view.setZoom(view.zoom - zoomed);
@@ -85,13 +81,13 @@ export class Compare {
   }
 
   /** Adds a map with copies of the page's layers. */
-  #addMap(): map {
+  #addMap(): Map3D {
     const { view, onClick, hasHaze } = this.#context;
     const box = document.createElement("div");
     box.className = "compared";
     view.container.parentElement?.append(box);
     const { center, zoom, direction, light, drawer, options } = view;
-    const other = new map(box, {
+    const other = new Map3D(box, {
       ...(center && { center }),
       zoom,
       direction,
@@ -102,13 +98,7 @@ export class Compare {
       scaleBar: false,
       attribution: false,
     });
-    other
-      .on("error", ({ error }) => {
-        report(error);
-      })
-      .on("click", (event) => {
-        onClick(event);
-      });
+    other.on("error", ({ error }) => report(error)).on("click", (event) => onClick(event));
     for (const layer of view.layers) {
       const copy = layer.copy();
       this.#copies.push([layer, copy.addTo(other)]);
@@ -117,8 +107,8 @@ export class Compare {
     other.whenReady(() => {
       if (hasHaze && first) new Haze(other, first);
       if (first?.rendering?.layers.has("depth") && !options.dataSaver)
-        import("./map3d-shade.module.js").then(({ shade }) => {
-          new shade().addTo(other);
+        import("./map3d-shade.module.js").then(({ Shade }) => {
+          new Shade().addTo(other);
         }, report);
     });
     return other;

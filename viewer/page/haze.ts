@@ -1,4 +1,4 @@
-import type { imageLayer, map, View } from "./map3d.module.js";
+import type { ImageLayer, Map3D, View } from "./map3d.module.js";
 import { computeHaze } from "./hazeMask";
 
 /** Pixels of the mask along each side; it covers the square of a view. */
@@ -9,8 +9,8 @@ type Draw = (context: CanvasRenderingContext2D) => void;
 
 /** Lets the content fade into the background towards its edge, over both drawers, and colours the background by the light of the sky. */
 export class Haze {
-  readonly #view: map;
-  readonly #layer: imageLayer;
+  readonly #view: Map3D;
+  readonly #layer: ImageLayer;
   readonly #canvas = document.createElement("canvas");
   readonly #masks = new Map<string, Promise<Uint8ClampedArray | null>>();
   #mask: Uint8ClampedArray | null = null;
@@ -18,22 +18,16 @@ export class Haze {
   #direction = "";
 
   /** @param layer one whose manifest has loaded */
-  constructor(view: map, layer: imageLayer) {
+  constructor(view: Map3D, layer: ImageLayer) {
     [this.#view, this.#layer] = [view, layer];
     [this.#canvas.width, this.#canvas.height, this.#canvas.className] = [SIDE_PX, SIDE_PX, "haze"];
     view.canvas.after(this.#canvas);
-    view.frameEvents.on("move", () => {
-      this.#place();
-    });
+    view.frameEvents.on("move", () => this.#place());
     view.on("idle", () => {
       void this.#update();
     });
-    view.on("lightchange", () => {
-      this.#color();
-    });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      this.#color();
-    });
+    view.on("lightchange", () => this.#color());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.#color());
     this.#color();
   }
 
@@ -62,9 +56,7 @@ export class Haze {
     const [x, y, size] = square;
     const canvas = this.#canvas.cloneNode() as HTMLCanvasElement;
     fill(canvas, mask, paper ?? this.#rgb);
-    return (context) => {
-      context.drawImage(canvas, x, y, size, size);
-    };
+    return (context) => context.drawImage(canvas, x, y, size, size);
   }
 
   /** Shows the haze of the current view once its mask is known. Without one, as offline, there is no haze. */
@@ -128,8 +120,6 @@ export class Haze {
 /** Fills a canvas with a colour of the opacity of a mask. */
 function fill(canvas: HTMLCanvasElement, mask: Uint8ClampedArray, rgb: Rgb): void {
   const image = new ImageData(SIDE_PX, SIDE_PX);
-  mask.forEach((alpha, k) => {
-    image.data.set([...rgb, alpha], 4 * k);
-  });
+  mask.forEach((alpha, k) => image.data.set([...rgb, alpha], 4 * k));
   canvas.getContext("2d")?.putImageData(image, 0, 0);
 }

@@ -390,7 +390,5 @@ export function translatePage(page: ParentNode = document): void {
     element.setAttribute("aria-label", text);
     if (element.hasAttribute("title")) element.title = text;
   });
-  each("i18n-placeholder", (element, text) => {
-    element.setAttribute("placeholder", text);
-  });
+  each("i18n-placeholder", (element, text) => element.setAttribute("placeholder", text));
 }

@@ -1,4 +1,4 @@
-import type { imageLayer, map } from "./map3d.module.js";
+import type { ImageLayer, Map3D } from "./map3d.module.js";
 import { describe, NOT_HIGHLIGHTED } from "./card";
 import { byId, withText } from "./dom";
 import { message } from "./i18n";
@@ -10,7 +10,7 @@ const MAX_ROWS = 30;
 const MAX_PARTS = 200;
 
 /** Binds the list of objects in view, largest first: for screen readers and keyboards. */
-export function bindInViewList(view: map, layer: () => imageLayer, select: (id: number) => void): void {
+export function bindInViewList(view: Map3D, layer: () => ImageLayer, select: (id: number) => void): void {
   const [button, box] = [byId("list-in-view"), byId("in-view")];
   const close = (): void => {
     box.hidden = true;
@@ -33,9 +33,7 @@ export function bindInViewList(view: map, layer: () => imageLayer, select: (id: 
         button.setAttribute("aria-expanded", "true");
         (box.querySelector("button") ?? box).focus();
       },
-      (reason: unknown) => {
-        report(reason);
-      },
+      (reason: unknown) => report(reason),
     );
   });
   box.addEventListener("keydown", (event) => {
@@ -49,7 +47,7 @@ export function bindInViewList(view: map, layer: () => imageLayer, select: (id: 
 type Row = readonly [id: number, name: string];
 
 /** Lists the largest objects, each with all its parts once, without the ground. */
-async function objectsInView(view: map, layer: imageLayer): Promise<Row[]> {
+async function objectsInView(view: Map3D, layer: ImageLayer): Promise<Row[]> {
   const visible = (await view.objectsInView()).filter((object) => object.layer === layer).slice(0, MAX_PARTS);
   const wholes = await Promise.all(visible.map(({ id }) => findWhole<Described>(layer, { id })));
   const named = wholes
@@ -63,9 +61,7 @@ function listOf(rows: readonly Row[], select: (id: number) => void): HTMLElement
   for (const [id, name] of rows) {
     const button = withText("button", name);
     button.type = "button";
-    button.addEventListener("click", () => {
-      select(id);
-    });
+    button.addEventListener("click", () => select(id));
     const row = document.createElement("li");
     row.append(button);
     list.append(row);

@@ -58,9 +58,7 @@ export class InfoPanel {
     path.setAttribute("d", "M6 6l12 12M18 6L6 18");
     svg.append(path);
     button.append(svg);
-    button.addEventListener("click", () => {
-      this.close();
-    });
+    button.addEventListener("click", () => this.close());
     return button;
   }
 }
@@ -85,12 +83,8 @@ function copyButton({ title, rows, details }: Card): HTMLButtonElement {
   button.addEventListener("click", () => {
     const text = [title, ...[...rows, ...details].map(([name, value]) => `${name}\t${value}`)].join("\n");
     navigator.clipboard.writeText(text).then(
-      () => {
-        toast(message("copied"));
-      },
-      (reason: unknown) => {
-        report(reason);
-      },
+      () => toast(message("copied")),
+      (reason: unknown) => report(reason),
     );
   });
   return button;

@@ -1,4 +1,4 @@
-import { chooseUtcOffset, computeDaylight, type imageLayer, type Light, type map, type Rendering } from "./map3d.module.js";
+import { chooseUtcOffset, computeDaylight, type ImageLayer, type Light, type Map3D, type Rendering } from "./map3d.module.js";
 import { findFirstSun } from "../src/geo/firstSun";
 import { findDay } from "./day";
 import { byId, inputById } from "./dom";
@@ -15,7 +15,7 @@ export function lightAt(hour: number): Pick<Light, "azimuth_deg" | "altitude_deg
 }
 
 /** Binds the time slider, which moves the light through the selected day. It is disabled while the mode is not lit. */
-export function bindLight(view: map, layer: imageLayer, first?: Date): void {
+export function bindLight(view: Map3D, layer: ImageLayer, first?: Date): void {
   const { rendering } = layer;
   if (!rendering) return;
   const [time, sun] = [inputById("time"), byId("sun")];
@@ -34,7 +34,7 @@ export function bindLight(view: map, layer: imageLayer, first?: Date): void {
   });
 }
 
-function bindDay(view: map, rendering: Rendering, requested: Date | undefined): void {
+function bindDay(view: Map3D, rendering: Rendering, requested: Date | undefined): void {
   const [time, day] = [inputById("time"), inputById("day")];
   const zone = (): number =>
     chooseUtcOffset(rendering.json.geographic?.lon_lat[0] ?? 0, -new Date(`${day.value}T12:00`).getTimezoneOffset() / 60);
@@ -105,7 +105,7 @@ export function showShadowSwitch(): void {
   byId("days").hidden = byId("shading").hidden = false;
 }
 
-function bindShadows(view: map, { layers }: Rendering): void {
+function bindShadows(view: Map3D, { layers }: Rendering): void {
   const box = inputById("shadows");
   box.checked = view.light.shadows;
   if (["sun", "sun16", "ao"].some((kind) => layers.has(kind))) showShadowSwitch();

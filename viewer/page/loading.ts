@@ -1,11 +1,11 @@
-import type { map } from "./map3d.module.js";
+import type { Map3D } from "./map3d.module.js";
 import { byId } from "./dom";
 
 /** Shorter waits are not shown, ms. */
 const DELAY_MS = 400;
 
 /** Shows a bar at the top while tiles in view are missing, or a turn waits for its tiles. */
-export function bindLoading(view: map): void {
+export function bindLoading(view: Map3D): void {
   const bar = byId("loading");
   let since_ms: number | null = performance.now();
   view.on("move", () => {

@@ -1,4 +1,4 @@
-import type { map } from "./map3d.module.js";
+import type { Map3D } from "./map3d.module.js";
 import type { AreaProgress, DownloadOptions, StoredArea } from "./map3d-offline.module.js";
 import { byId, withText } from "./dom";
 import { toast } from "./toast";
@@ -17,7 +17,7 @@ export const PAGE_FILES = [
 ];
 
 /** Binds the dialog that saves the current view for offline use. Stores nothing until the user saves an area. */
-export function bindOffline(view: map, name: string): void {
+export function bindOffline(view: Map3D, name: string): void {
   if (!isSecureContext || !("serviceWorker" in navigator)) return;
   const [button, dialog, details] = [
     byId("save-offline"),
@@ -31,16 +31,14 @@ export function bindOffline(view: map, name: string): void {
         opened ??= new OfflineDialog(view, name, offline, dialog, details);
         opened.open();
       },
-      (reason: unknown) => {
-        toast(introduce("toolFailed", reason));
-      },
+      (reason: unknown) => toast(introduce("toolFailed", reason)),
     );
   });
   let opened: OfflineDialog | undefined;
 }
 
 class OfflineDialog {
-  readonly #view: map;
+  readonly #view: Map3D;
   readonly #name: string;
   readonly #offline: Offline;
   readonly #dialog: HTMLDialogElement;
@@ -48,7 +46,7 @@ class OfflineDialog {
   #download: AbortController | undefined;
   #request = 0;
 
-  constructor(view: map, name: string, offline: Offline, dialog: HTMLDialogElement, details: HTMLSelectElement) {
+  constructor(view: Map3D, name: string, offline: Offline, dialog: HTMLDialogElement, details: HTMLSelectElement) {
     [this.#view, this.#name, this.#offline, this.#dialog, this.#details] = [view, name, offline, dialog, details];
     details.addEventListener("change", () => void this.#estimate());
     dialog.addEventListener("close", () => {

@@ -1,5 +1,5 @@
-import type { map } from "./map3d.module.js";
-import type { orbit } from "./map3d-orbit.module.js";
+import type { Map3D } from "./map3d.module.js";
+import type { Orbit } from "./map3d-orbit.module.js";
 import { prefersReducedMotion } from "../src/core/dom";
 import { GESTURES } from "./dom";
 
@@ -16,7 +16,7 @@ const LONGEST_FRAME_MS = 100;
 const SEEN = "map3d-opening";
 
 /** Turns the map once around when it opens, slowly: once in a session, and until the first touch, turn of the wheel or key. Never with reduced motion, saved data, or fewer than three directions. */
-export function bindOpening(view: map, turn: orbit): void {
+export function bindOpening(view: Map3D, turn: Orbit): void {
   const pitch = view.directions.find(({ id }) => id === view.direction)?.pitchDeg;
   const directions = view.directions.filter(({ pitchDeg }) => pitchDeg === pitch);
   if (directions.length < MIN_DIRECTIONS || view.drawer !== "webgl" || view.options.dataSaver || prefersReducedMotion() || wasSeen())

@@ -35,9 +35,7 @@ export function openShareDialog(message: Message): void {
     actions,
   );
   dialog.append(form);
-  dialog.addEventListener("close", () => {
-    dialog.remove();
-  });
+  dialog.addEventListener("close", () => dialog.remove());
   document.body.append(dialog);
   dialog.showModal();
 }
@@ -58,17 +56,13 @@ function button(text: string, act: () => void): HTMLButtonElement {
 function copyable(message: Message, label: MessageKey, id: string, value: string): HTMLElement {
   const [row, name, field] = [withText("div", "", "share-row"), withText("label", message(label)), document.createElement("input")];
   [name.htmlFor, field.id, field.readOnly, field.value] = [id, id, true, value];
-  field.addEventListener("focus", () => {
-    field.select();
-  });
+  field.addEventListener("focus", () => field.select());
   const copy = button(message("copy"), () => {
     navigator.clipboard.writeText(value).then(
       () => {
         copy.textContent = message("copiedShort");
       },
-      () => {
-        field.select();
-      },
+      () => field.select(),
     );
   });
   copy.id = `${id}-copy`;

@@ -1,5 +1,5 @@
-import { FetchError, imageLayer, map, Map3dError } from "./map3d.module.js";
-import type { overview as Overview } from "./map3d-controls.module.js";
+import { FetchError, ImageLayer, Map3D, Map3dError } from "./map3d.module.js";
+import type { Overview } from "./map3d-controls.module.js";
 import { Permalink, readPermalink } from "./permalink";
 import { Colors } from "./colors";
 import { Compare } from "./compare";
@@ -35,17 +35,13 @@ const MAX_TITLE = 200;
 function open(): void {
   const isFresh = location.hash === "";
   const { time, id, by, epoch = 0, ...start } = readPermalink(location.hash);
-  const view = new map("mapcanvas", { cover: true, light: lightAt(FIRST_HOUR), ...start });
+  const view = new Map3D("mapcanvas", { cover: true, light: lightAt(FIRST_HOUR), ...start });
   const urls = baseUrls();
-  const layer = new imageLayer(urls);
-  const info = new InfoPanel(byId("info"), () => {
-    selection.clear();
-  });
+  const layer = new ImageLayer(urls);
+  const info = new InfoPanel(byId("info"), () => selection.clear());
   const permalink = new Permalink(view);
   const selection = new Selection(view, layer, info, permalink);
-  view.on("error", ({ error }) => {
-    showError(layer, error);
-  });
+  view.on("error", ({ error }) => showError(layer, error));
   let tools: Tools | undefined;
   view.on("click", (event) => {
     if (!tools?.active) selection.select(event);
@@ -76,13 +72,9 @@ function open(): void {
     const compare = new Compare({
       view,
       hasHaze: others.length === 0,
-      onClick: (event) => {
-        selection.select(event);
-      },
+      onClick: (event) => selection.select(event),
     });
-    selection.onChange = () => {
-      compare.highlight();
-    };
+    selection.onChange = () => compare.highlight();
   });
   showThumbnail(view, layer);
   layer.addTo(view);
@@ -90,28 +82,28 @@ function open(): void {
 }
 
 /** Adds what the page does not need for its first picture. @param opens whether the map begins with a turn around the content */
-async function loadEntries(view: map, layer: imageLayer, opens: boolean): Promise<void> {
+async function loadEntries(view: Map3D, layer: ImageLayer, opens: boolean): Promise<void> {
   // Depth is as large as colours and normals: it loads after the first picture.
   if (layer.rendering?.layers.has("depth") && !view.options.dataSaver)
     view.once("load", () => {
-      import("./map3d-shade.module.js").then(({ shade }) => {
-        new shade().addTo(view);
+      import("./map3d-shade.module.js").then(({ Shade }) => {
+        new Shade().addTo(view);
         if (view.drawer === "webgl") showShadowSwitch();
       }, report);
       import("./map3d-orbit.module.js")
-        .then(({ orbit }) => {
-          const turn = new orbit().addTo(view);
+        .then(({ Orbit }) => {
+          const turn = new Orbit().addTo(view);
           if (opens) bindOpening(view, turn);
         })
         .catch(report);
     });
-  const { locate, overview } = await import("./map3d-controls.module.js");
-  if (layer.rendering?.json.geographic) new locate().addTo(view);
-  bindOverview(view, new overview({ collapsed: true }).addTo(view));
+  const { Locate, Overview } = await import("./map3d-controls.module.js");
+  if (layer.rendering?.json.geographic) new Locate().addTo(view);
+  bindOverview(view, new Overview({ collapsed: true }).addTo(view));
 }
 
 /** Reports an error; without a map, or without a way to its tiles, in place of the page. */
-function showError(layer: imageLayer, error: Error): void {
+function showError(layer: ImageLayer, error: Error): void {
   // Archives are requested in parts.
   const ignoresRanges = layer.rendering && error instanceof FetchError && error.status === 200;
   if (layer.rendering && !ignoresRanges) {
@@ -119,10 +111,7 @@ function showError(layer: imageLayer, error: Error): void {
     return;
   }
   showFailure(message("mapFailed"), ignoresRanges ? message("noRanges") : error.message);
-  if (!navigator.onLine)
-    addEventListener("online", () => {
-      location.reload();
-    });
+  if (!navigator.onLine) addEventListener("online", () => location.reload());
 }
 
 /** Zoom levels above the lowest at which the overview opens, on wide screens: about one quarter of the scene is in view. */
@@ -130,7 +119,7 @@ const OVERVIEW_ZOOM = 2.4;
 const WIDE = "(min-width: 640px)";
 
 /** Opens the overview once, when a small part of the scene is in view. */
-function bindOverview(view: map, small: Overview): void {
+function bindOverview(view: Map3D, small: Overview): void {
   const open = (): void => {
     if (view.zoom < view.zoomLimits[0] + OVERVIEW_ZOOM || !matchMedia(WIDE).matches) return;
     view.off("zoom", open);
@@ -141,7 +130,7 @@ function bindOverview(view: map, small: Overview): void {
 }
 
 /** Fills in and binds the page's controls, once the map is ready. */
-function bindPage(view: map, layer: imageLayer, info: InfoPanel, selection: Selection, time: Date | undefined): void {
+function bindPage(view: Map3D, layer: ImageLayer, info: InfoPanel, selection: Selection, time: Date | undefined): void {
   const json = layer.rendering?.json;
   if (!json) return;
   document.title = byId("title").textContent = (json.title || json.name).slice(0, MAX_TITLE);

@@ -1,4 +1,4 @@
-import type { map, Vec3 } from "./map3d.module.js";
+import type { Map3D, Vec3 } from "./map3d.module.js";
 
 /** The state that the page's URL fragment holds. */
 export interface PermalinkState {
@@ -51,23 +51,17 @@ export class Permalink {
   epoch = 0;
   /** Attribute that objects are coloured by; "" for none. */
   by = "";
-  readonly #view: map;
+  readonly #view: Map3D;
   #timer = 0;
   #paused = false;
 
-  constructor(view: map) {
+  constructor(view: Map3D) {
     this.#view = view;
-    view.on("moveend", () => {
-      this.write();
-    });
-    view.on("directionchange", () => {
-      this.write();
-    });
+    view.on("moveend", () => this.write());
+    view.on("directionchange", () => this.write());
     view.on("lightchange", () => {
       clearTimeout(this.#timer);
-      this.#timer = window.setTimeout(() => {
-        this.write();
-      }, THROTTLE_MS);
+      this.#timer = window.setTimeout(() => this.write(), THROTTLE_MS);
     });
   }
 
@@ -102,7 +96,7 @@ export class Permalink {
 }
 
 /** The centre in the URL, as long as it is still at the centre of the screen: new tiles change the height of the surface there, which must not rewrite the URL. */
-function writtenCenter(view: map): Vec3 | null {
+function writtenCenter(view: Map3D): Vec3 | null {
   const { direction, center, zoom } = readPermalink(location.hash);
   const at = direction === view.direction && center && Math.abs((zoom ?? NaN) - view.zoom) < 0.01 ? view.project(center) : null;
   const { clientWidth, clientHeight } = view.container;

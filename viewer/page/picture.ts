@@ -1,4 +1,4 @@
-import type { map, ManifestJson } from "./map3d.module.js";
+import type { Map3D, ManifestJson } from "./map3d.module.js";
 import type { PictureLegend, PictureOptions } from "./map3d-print.module.js";
 import { byId, withText } from "./dom";
 import { language, introduce, message } from "./i18n";
@@ -16,7 +16,7 @@ const LONGEST_SIDE_PX = 8192;
 
 /** The map to save or print. */
 export interface PictureContext {
-  readonly view: map;
+  readonly view: Map3D;
   readonly json: ManifestJson;
   /** The active theme's legend, if any. */
   legend(): PictureLegend | undefined;
@@ -49,16 +49,12 @@ export function bindPicture(context: PictureContext): void {
     setBusy(true);
     task(size, signal)
       .then(
-        () => {
-          dialog.close();
-        },
+        () => dialog.close(),
         (reason: unknown) => {
           if (!signal.aborted) showError(introduce("imageFailed", reason));
         },
       )
-      .finally(() => {
-        setBusy(false);
-      });
+      .finally(() => setBusy(false));
   };
   button.addEventListener("click", () => {
     const at = Math.max(select.selectedIndex, 0);
@@ -70,15 +66,9 @@ export function bindPicture(context: PictureContext): void {
     dialog.showModal();
   });
   select.addEventListener("change", note);
-  dialog.addEventListener("close", () => {
-    running?.abort();
-  });
-  byId("picture-save").addEventListener("click", () => {
-    run((size, signal) => save(context, size, signal));
-  });
-  byId("picture-print").addEventListener("click", () => {
-    run((size, signal) => print(context, size, signal));
-  });
+  dialog.addEventListener("close", () => running?.abort());
+  byId("picture-save").addEventListener("click", () => run((size, signal) => save(context, size, signal)));
+  byId("picture-print").addEventListener("click", () => run((size, signal) => print(context, size, signal)));
 }
 
 function sizesOf({ clientWidth: width, clientHeight: height }: HTMLCanvasElement): PictureSize[] {
@@ -128,9 +118,7 @@ async function createPicture(
     textScale,
     signal,
     ...(draw && { overlay: draw }),
-    progress: (done, total) => {
-      showProgress(done / total);
-    },
+    progress: (done, total) => showProgress(done / total),
     ...more,
   });
 }
@@ -142,9 +130,7 @@ async function save(context: PictureContext, size: PictureSize, signal: AbortSig
   link.href = URL.createObjectURL(blob);
   link.download = `${context.json.name}-${context.view.direction}.png`;
   link.click();
-  setTimeout(() => {
-    URL.revokeObjectURL(link.href);
-  }, 60_000);
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }
 
 /** Prints the picture with title, legend and attribution on a print-only sheet. */

@@ -35,9 +35,7 @@ export function bindPlay(time: HTMLInputElement): void {
     if (hour >= Number(time.max)) toggle(false);
     else requestAnimationFrame(step);
   };
-  button.addEventListener("click", () => {
-    toggle(!playing);
-  });
+  button.addEventListener("click", () => toggle(!playing));
   time.addEventListener("input", ({ isTrusted }) => {
     if (isTrusted) toggle(false);
   });

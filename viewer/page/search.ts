@@ -1,4 +1,4 @@
-import type { imageLayer, map, SearchEntry, Vec3 } from "./map3d.module.js";
+import type { ImageLayer, Map3D, SearchEntry, Vec3 } from "./map3d.module.js";
 import { nameOfResult } from "./card";
 import { byId, inputById, withText } from "./dom";
 import { toast } from "./toast";
@@ -7,15 +7,13 @@ import { introduce, message } from "./i18n";
 const ZOOM_BELOW_DEEPEST = 1;
 
 /** Binds the search box: a combobox over the rendering's search index, of which the first search fetches a part. @param goTo selects the object that the user chooses and flies there */
-export function bindSearch(view: map, layer: () => imageLayer, goTo: (id: number, position: Vec3, zoom: number) => void): void {
+export function bindSearch(view: Map3D, layer: () => ImageLayer, goTo: (id: number, position: Vec3, zoom: number) => void): void {
   const [form, query, list] = [byId("search"), inputById("query"), byId("results")];
   const box = new SearchBox(
     query,
     list,
     (text) => layer().search(text),
-    (entry) => {
-      go(view, layer(), entry, goTo);
-    },
+    (entry) => go(view, layer(), entry, goTo),
   );
   form.hidden = false;
   form.addEventListener("submit", (event) => {
@@ -24,7 +22,7 @@ export function bindSearch(view: map, layer: () => imageLayer, goTo: (id: number
   });
 }
 
-function go(view: map, layer: imageLayer, [id, , local]: SearchEntry, goTo: (id: number, position: Vec3, zoom: number) => void): void {
+function go(view: Map3D, layer: ImageLayer, [id, , local]: SearchEntry, goTo: (id: number, position: Vec3, zoom: number) => void): void {
   const json = layer.rendering?.json;
   if (!json) return;
   const world = [json.origin[0] + local[0], json.origin[1] + local[1], json.origin[2] + local[2]] as const satisfies Vec3;
@@ -48,12 +46,8 @@ class SearchBox {
     [this.#query, this.#list, this.#find, this.#select] = [query, list, find, select];
     query.addEventListener("input", () => void this.#update());
     query.addEventListener("focus", () => void this.#update());
-    query.addEventListener("blur", () => {
-      this.#show(false);
-    });
-    query.addEventListener("keydown", (event) => {
-      this.#key(event);
-    });
+    query.addEventListener("blur", () => this.#show(false));
+    query.addEventListener("keydown", (event) => this.#key(event));
   }
 
   choose(at = this.#at): void {
@@ -91,9 +85,7 @@ class SearchBox {
     row.addEventListener("pointerdown", (event) => {
       event.preventDefault(); // keeps the focus in the search box until the click
     });
-    row.addEventListener("click", () => {
-      this.choose(k);
-    });
+    row.addEventListener("click", () => this.choose(k));
     return row;
   }
 

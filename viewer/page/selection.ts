@@ -1,4 +1,4 @@
-import { marker, type ClickEvent, type imageLayer, type map, type Vec3 } from "./map3d.module.js";
+import { Marker, type ClickEvent, type ImageLayer, type Map3D, type Vec3 } from "./map3d.module.js";
 import type { InfoPanel } from "./info";
 import { NOT_HIGHLIGHTED } from "./card";
 import { GESTURES } from "./dom";
@@ -11,30 +11,28 @@ const CLEAR_PX = 40;
 
 /** The selected object: highlighted, described in the info panel and kept in the permalink. The back button returns to the previous selection. */
 export class Selection {
-  readonly #view: map;
-  #layer: imageLayer;
+  readonly #view: Map3D;
+  #layer: ImageLayer;
   readonly #info: InfoPanel;
   readonly #permalink: Permalink;
   #clicks = 0;
   /** Called after the highlights have changed. */
   onChange = (): void => undefined;
   /** The marker of the search result that is selected, or of a spot on the ground. */
-  #pin: marker | undefined;
+  #pin: Marker | undefined;
 
-  constructor(view: map, layer: imageLayer, info: InfoPanel, permalink: Permalink) {
+  constructor(view: Map3D, layer: ImageLayer, info: InfoPanel, permalink: Permalink) {
     [this.#view, this.#layer, this.#info, this.#permalink] = [view, layer, info, permalink];
-    addEventListener("popstate", () => {
-      this.#restore();
-    });
+    addEventListener("popstate", () => this.#restore());
   }
 
   /** The layer that objects are selected in. */
-  get layer(): imageLayer {
+  get layer(): ImageLayer {
     return this.#layer;
   }
 
   /** Switches to another layer and clears the selection. */
-  setLayer(layer: imageLayer): void {
+  setLayer(layer: ImageLayer): void {
     if (this.#permalink.id > 0) this.#info.close();
     this.#layer = layer;
   }
@@ -58,14 +56,7 @@ export class Selection {
   /** Selects an object found by a search and flies there: at once, and beside the card as soon as that is shown. */
   async goTo(id: number, position: Vec3, zoom: number): Promise<void> {
     const approach = new AbortController();
-    for (const type of GESTURES)
-      addEventListener(
-        type,
-        () => {
-          approach.abort();
-        },
-        { once: true, capture: true, signal: approach.signal },
-      );
+    for (const type of GESTURES) addEventListener(type, () => approach.abort(), { once: true, capture: true, signal: approach.signal });
     this.#view.flyTo(position, zoom);
     await this.selectId(id, position, true, true);
     if (!approach.signal.aborted && this.#permalink.id === id) this.#flyClear(position, zoom);
@@ -87,7 +78,7 @@ export class Selection {
       low && high && origin ? [origin[0] + (low[0] + high[0]) / 2, origin[1] + (low[1] + high[1]) / 2, origin[2] + high[2]] : null;
     const event: ClickEvent = { id, position: position ?? top, approximate: false, layer: this.#layer, point: [0, 0], ...(object ?? {}) };
     const title = this.#show(event, pin);
-    if (pin && event.position) this.#pin = new marker(title, event.position).addTo(this.#view).select();
+    if (pin && event.position) this.#pin = new Marker(title, event.position).addTo(this.#view).select();
     if (push) this.#permalink.write(changed);
   }
 
@@ -113,7 +104,7 @@ export class Selection {
     if (isObject) this.#layer.highlight(event.id);
     this.onChange();
     const title = this.#info.show(event, isObject ? this.#showBack(event) : undefined);
-    if (!isObject && event.position) this.#pin = new marker(title, event.position, { showLabel: false }).addTo(this.#view);
+    if (!isObject && event.position) this.#pin = new Marker(title, event.position, { showLabel: false }).addTo(this.#view);
     if (event.position && !keepsView) this.#moveClear(event.position);
     return title;
   }
@@ -153,9 +144,7 @@ export class Selection {
               low && high && origin ? (([0, 1, 2] as const).map((k) => origin[k] + (low[k] + high[k]) / 2) as unknown as Vec3) : position;
             this.#view.setDirection(opposite.id, middle);
           },
-          (reason: unknown) => {
-            report(reason);
-          },
+          (reason: unknown) => report(reason),
         );
       })
     );

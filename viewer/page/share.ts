@@ -7,8 +7,6 @@ import { message } from "./i18n";
 export function bindShare(permalink: Permalink): void {
   byId("share").addEventListener("click", () => {
     permalink.write();
-    import("./page-share.js").then(({ openShareDialog }) => {
-      openShareDialog(message);
-    }, report);
+    import("./page-share.js").then(({ openShareDialog }) => openShareDialog(message), report);
   });
 }

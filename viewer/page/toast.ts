@@ -12,14 +12,10 @@ export function toast(text: string): void {
   const box = withText("div", "", "toast");
   const close = withText("button", message("close"));
   close.type = "button";
-  close.addEventListener("click", () => {
-    box.remove();
-  });
+  close.addEventListener("click", () => box.remove());
   box.append(withText("p", text), close);
   toasts.append(box);
-  setTimeout(() => {
-    box.remove();
-  }, DURATION_MS);
+  setTimeout(() => box.remove(), DURATION_MS);
 }
 
 /** Causes of errors that have been shown. */
@@ -40,9 +36,7 @@ export function report(reason: unknown): void {
 /** Says once when the network goes, and again the next time. */
 export function bindNetwork(): void {
   addEventListener("offline", report);
-  addEventListener("online", () => {
-    shown.clear();
-  });
+  addEventListener("online", () => shown.clear());
 }
 
 /** Shows an error in place of the map. */

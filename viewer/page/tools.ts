@@ -1,5 +1,5 @@
-import type { map } from "./map3d.module.js";
-import type { measure } from "./map3d-measure.module.js";
+import type { Map3D } from "./map3d.module.js";
+import type { Measure } from "./map3d-measure.module.js";
 import { byId, withText } from "./dom";
 import { toast } from "./toast";
 import { introduce, message } from "./i18n";
@@ -13,28 +13,24 @@ const hintOf = (kind: Kind): string =>
 
 /** The measuring tool: a button that opens it, the kinds, the results, and buttons that add a point, undo, clear and finish. */
 export class Tools {
-  readonly #view: map;
+  readonly #view: Map3D;
   readonly #buttons: ReadonlyMap<Kind, HTMLElement>;
-  #tool: measure | undefined;
+  #tool: Measure | undefined;
   #kind: Kind | null = null;
   /** The kind that is chosen first. */
   #last: Kind = "line";
 
-  constructor(view: map) {
+  constructor(view: Map3D) {
     this.#view = view;
     this.#buttons = new Map(KINDS.map((kind) => [kind, byId(`measure-${kind}`)]));
     for (const [kind, button] of this.#buttons) button.addEventListener("click", () => void this.#activate(kind));
     byId("measure").hidden = false;
     const actions = {
       measure: () => void this.#activate(this.#last),
-      "measure-add": () => {
-        this.#addPoint();
-      },
+      "measure-add": () => this.#addPoint(),
       "measure-undo": () => this.#tool?.undo(),
       "measure-clear": () => this.#tool?.clear(),
-      "measure-finish": () => {
-        this.#finish();
-      },
+      "measure-finish": () => this.#finish(),
     };
     for (const [id, act] of Object.entries(actions)) byId(id).addEventListener("click", act);
     // Before the tool's own listener, which would only clear the points.
@@ -65,9 +61,7 @@ export class Tools {
     try {
       const entry = await import("./map3d-measure.module.js");
       if (this.#kind !== kind) return;
-      const showResults = (): void => {
-        this.#showResults();
-      };
+      const showResults = (): void => this.#showResults();
       this.#tool = new entry.measure({ kind })
         .on("change", showResults)
         .on("face", showResults)

@@ -1,8 +1,8 @@
 /** map3d: shows renderings of 3D city models. See README.md. */
-export { map, map as Map, map as Map3D } from "./map/map";
-export { imageLayer, imageLayer as ImageLayer, type ImageLayerEvents, type ImageLayerOptions } from "./map/imageLayer";
-export { marker, marker as Marker, type MarkerEvents, type MarkerOptions } from "./overlay/marker";
-export { popup, popup as Popup, type PopupEvents, type PopupOptions } from "./overlay/popup";
+export { Map3D, Map3D as Map, Map3D as map } from "./map/map";
+export { ImageLayer, ImageLayer as imageLayer, type ImageLayerEvents, type ImageLayerOptions } from "./map/imageLayer";
+export { Marker, Marker as marker, type MarkerEvents, type MarkerOptions } from "./overlay/marker";
+export { Popup, Popup as popup, type PopupEvents, type PopupOptions } from "./overlay/popup";
 /** @internal */
 export { findHeight } from "./map/findPosition";
 /** @internal */

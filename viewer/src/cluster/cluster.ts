@@ -2,7 +2,7 @@ import { adoptStyles, element } from "../core/dom";
 import { selectTranslation } from "../core/i18n";
 import { sub, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
-import { MapLayer, marker, UsageError, type map, type Relief } from "../map3d";
+import { MapLayer, Marker, UsageError, type Map3D, type Relief } from "../map3d";
 import { groupPoints, spiderOffsets, type MarkerGroup } from "./groups";
 import { STYLES } from "./styles";
 
@@ -12,14 +12,14 @@ export interface ClusterOptions {
   /** Any CSS colour. Default: the map's accent colour. */
   color?: string;
   /** Returns the accessible name of a cluster. Default: the number of its markers. */
-  label?: (markers: readonly marker[]) => string;
+  label?: (markers: readonly Marker[]) => string;
 }
 
 export interface ClusterEvents {
   /** A cluster was clicked. */
-  click: { markers: readonly marker[]; position: Vec3 };
+  click: { markers: readonly Marker[]; position: Vec3 };
   /** The markers of a cluster were spread, because no zoom level separates them. */
-  spread: { markers: readonly marker[] };
+  spread: { markers: readonly Marker[] };
   /** Spread markers were joined again. */
   join: object;
 }
@@ -36,7 +36,7 @@ const SPREAD_PX = 48;
 const SVG = "http://www.w3.org/2000/svg";
 
 interface VisibleItem {
-  readonly item: marker;
+  readonly item: Marker;
   readonly group: MarkerGroup;
 }
 
@@ -44,9 +44,9 @@ interface VisibleItem {
  * Combines markers that are close together on the screen. A click zooms to where they separate, or spreads them if no zoom level separates them.
  * Clusters are computed per integer zoom level, so that they stay stable while the map moves. Only clusters in view have page elements.
  */
-export class cluster extends MapLayer<map, ClusterEvents> {
+export class Cluster extends MapLayer<Map3D, ClusterEvents> {
   readonly options: Required<Omit<ClusterOptions, "color" | "label">> & Pick<ClusterOptions, "color" | "label">;
-  #markers: readonly marker[];
+  #markers: readonly Marker[];
   #groups = new Map<number, MarkerGroup[]>();
   #uv = new Float64Array();
   #view = "";
@@ -55,7 +55,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
   #spread:
     | {
         readonly key: string;
-        readonly markers: readonly marker[];
+        readonly markers: readonly Marker[];
         readonly shifts: readonly Vec2[];
         readonly legs: SVGSVGElement;
         readonly zoom: number;
@@ -63,7 +63,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     | undefined;
 
   /** @param markers the cluster adds them to the map; do not add them yourself */
-  constructor(markers: readonly marker[] = [], options: ClusterOptions = {}) {
+  constructor(markers: readonly Marker[] = [], options: ClusterOptions = {}) {
     super();
     this.options = { radius_px: 56, ...options };
     if (!(this.options.radius_px > 0)) throw new UsageError(`radius_px must be greater than 0, got ${String(this.options.radius_px)}`);
@@ -71,12 +71,12 @@ export class cluster extends MapLayer<map, ClusterEvents> {
   }
 
   /** All markers, in the given order. */
-  get markers(): readonly marker[] {
+  get markers(): readonly Marker[] {
     return this.#markers;
   }
 
   /** Replaces all markers. Call it after markers have moved, too. */
-  setMarkers(markers: readonly marker[]): this {
+  setMarkers(markers: readonly Marker[]): this {
     const checked = checkMarkers(markers);
     this.#clear();
     this.#markers = checked;
@@ -85,7 +85,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     return this;
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     adoptStyles(document, STYLES);
     map.frameEvents.on("draw", this.#update);
     map.on("preclick", this.#join);
@@ -93,7 +93,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     this.#update();
   }
 
-  protected onRemove(map: map): void {
+  protected onRemove(map: Map3D): void {
     this.#clear();
     map.frameEvents.off("draw", this.#update);
     map.off("preclick", this.#join);
@@ -130,9 +130,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     this.#view = view;
     this.#groups.clear();
     this.#uv = new Float64Array(2 * this.#markers.length);
-    this.#markers.forEach((one, k) => {
-      this.#uv.set(uvdFromLocal(camera.frame.axes, sub(positionOf(one), origin)).slice(0, 2), 2 * k);
-    });
+    this.#markers.forEach((one, k) => this.#uv.set(uvdFromLocal(camera.frame.axes, sub(positionOf(one), origin)).slice(0, 2), 2 * k));
   }
 
   #groupsAt(relief: Relief, level: number): MarkerGroup[] {
@@ -141,7 +139,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     return groups;
   }
 
-  #show(map: map, key: string, group: MarkerGroup): void {
+  #show(map: Map3D, key: string, group: MarkerGroup): void {
     const markers = this.#markersOf(group);
     const [first] = markers;
     if (!first) return;
@@ -150,17 +148,17 @@ export class cluster extends MapLayer<map, ClusterEvents> {
     map.add(item);
   }
 
-  #markersOf({ members }: MarkerGroup): marker[] {
+  #markersOf({ members }: MarkerGroup): Marker[] {
     return members.flatMap((member) => this.#markers[member] ?? []);
   }
 
-  #clusterMarker(map: map, key: string, group: MarkerGroup, markers: readonly marker[]): marker {
+  #clusterMarker(map: Map3D, key: string, group: MarkerGroup, markers: readonly Marker[]): Marker {
     const { label, color } = this.options;
     const count = markers.length.toLocaleString(map.language);
     const position = [0, 1, 2].map(
       (k) => markers.reduce((sum, one) => sum + (positionOf(one)[k] as number), 0) / markers.length,
     ) as unknown as Vec3;
-    const item = new marker(label?.(markers) ?? selectTranslation(MESSAGES, map.language)(count), position, {
+    const item = new Marker(label?.(markers) ?? selectTranslation(MESSAGES, map.language)(count), position, {
       showLabel: false,
       icon: element("span", "map3d-cluster", {}, count),
       ...(color !== undefined && { color }),
@@ -173,7 +171,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
   }
 
   /** Zooms to the first level that separates the group, or spreads it. */
-  #expand(map: map, key: string, group: MarkerGroup, position: Vec3): void {
+  #expand(map: Map3D, key: string, group: MarkerGroup, position: Vec3): void {
     const relief = map.relief;
     if (!relief) return;
     const [, greatest] = map.zoomLimits;
@@ -187,7 +185,7 @@ export class cluster extends MapLayer<map, ClusterEvents> {
   }
 
   /** Spreads markers around a point of the screen. */
-  #spreadOut(map: map, key: string, markers: readonly marker[], [x, y]: Vec2): void {
+  #spreadOut(map: Map3D, key: string, markers: readonly Marker[], [x, y]: Vec2): void {
     const legs = document.createElementNS(SVG, "svg");
     legs.setAttribute("class", "map3d-legs");
     legs.setAttribute("aria-hidden", "true");
@@ -236,13 +234,13 @@ export class cluster extends MapLayer<map, ClusterEvents> {
 }
 
 /** @throws UsageError for a marker whose position is not known yet */
-function positionOf({ label, position }: marker): Vec3 {
+function positionOf({ label, position }: Marker): Vec3 {
   if (!position)
     throw new UsageError(`the position of the marker "${label}" is not known: give [x, y, z], or those that map.findPosition finds`);
   return position;
 }
 
-function checkMarkers(markers: readonly marker[]): readonly marker[] {
+function checkMarkers(markers: readonly Marker[]): readonly Marker[] {
   markers.forEach(positionOf);
   return [...markers];
 }

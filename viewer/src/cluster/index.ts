@@ -1,2 +1,2 @@
 /** map3d-cluster: combines markers that are close together. */
-export { cluster, cluster as Cluster, type ClusterEvents, type ClusterOptions } from "./cluster";
+export { Cluster, Cluster as cluster, type ClusterEvents, type ClusterOptions } from "./cluster";

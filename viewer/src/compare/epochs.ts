@@ -1,12 +1,12 @@
 import { adoptStyles, element, prefersReducedMotion } from "../core/dom";
 import { UsageError } from "../core/errors";
-import { MapLayer, type imageLayer, type map } from "../map3d";
+import { MapLayer, type ImageLayer, type Map3D } from "../map3d";
 import { STYLES } from "./styles";
 import { getCompareMessages } from "./i18n";
 
 /** A state of the city at one time. */
 export interface Epoch {
-  readonly layer: imageLayer;
+  readonly layer: ImageLayer;
   /** Label, such as a year. */
   readonly label: string;
 }
@@ -28,7 +28,7 @@ export interface EpochsEvents {
 }
 
 /** A slider that shows one of several layers. The previous layer stays until the next one is complete, then fades out. Adds the layers to the map. */
-export class epochs extends MapLayer<map, EpochsEvents> {
+export class Epochs extends MapLayer<Map3D, EpochsEvents> {
   readonly #list: readonly Epoch[];
   readonly #fade_ms: number;
   readonly #container: HTMLElement | undefined;
@@ -48,12 +48,8 @@ export class epochs extends MapLayer<map, EpochsEvents> {
     this.#fade_ms = fade_ms;
     this.#container = container;
     this.#slider = element("input", "", { type: "range", min: "0", max: String(list.length - 1), step: "1", value: String(shown) });
-    this.#slider.addEventListener("input", () => {
-      this.show(Number(this.#slider.value));
-    });
-    this.#slider.addEventListener("keydown", (event) => {
-      event.stopPropagation();
-    });
+    this.#slider.addEventListener("input", () => this.show(Number(this.#slider.value)));
+    this.#slider.addEventListener("keydown", (event) => event.stopPropagation());
     const ends = [list[0], list[list.length - 1]].map((epoch) => element("span", "", {}, epoch?.label ?? ""));
     this.#box = element("div", "map3d-epochs", {}, this.#name, this.#slider, element("div", "", { "aria-hidden": "true" }, ...ends));
   }
@@ -75,7 +71,7 @@ export class epochs extends MapLayer<map, EpochsEvents> {
     return this.fire("change", { epoch, index });
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     adoptStyles(document, STYLES);
     this.#slider.setAttribute("aria-label", getCompareMessages(map.language).time);
     this.#updateLabel();
@@ -83,7 +79,7 @@ export class epochs extends MapLayer<map, EpochsEvents> {
     (this.#container ?? map.overlayPane).append(this.#box);
   }
 
-  protected onRemove(map: map): void {
+  protected onRemove(map: Map3D): void {
     this.#endFade?.();
     this.#box.remove();
     for (const { layer } of this.#list) map.discard(layer.setOpacity(1));
@@ -107,7 +103,7 @@ export class epochs extends MapLayer<map, EpochsEvents> {
     if (old) this.#fadeOut(map, old);
   }
 
-  #fadeOut(map: map, old: imageLayer): void {
+  #fadeOut(map: Map3D, old: ImageLayer): void {
     const fade_ms = prefersReducedMotion() ? 0 : this.#fade_ms;
     let frame = 0;
     const end = (): void => {

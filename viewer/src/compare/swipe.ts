@@ -1,7 +1,7 @@
 import { adoptStyles, element, icon } from "../core/dom";
 import { UsageError } from "../core/errors";
 import { clamp } from "../core/vec";
-import { MapLayer, type imageLayer, type map } from "../map3d";
+import { MapLayer, type ImageLayer, type Map3D } from "../map3d";
 import { STYLES } from "./styles";
 import { getCompareMessages } from "./i18n";
 
@@ -18,17 +18,17 @@ export interface SwipeEvents {
 }
 
 /** One layer, or several layers on the same side. */
-export type Layers = imageLayer | readonly imageLayer[];
+export type Layers = ImageLayer | readonly ImageLayer[];
 
 const ARROWS = "M9 7l-5 5 5 5M15 7l5 5-5 5";
 const STEP = 0.02;
 
-const list = (layers: Layers): readonly imageLayer[] =>
-  Array.isArray(layers) ? (layers as readonly imageLayer[]) : [layers as imageLayer];
+const list = (layers: Layers): readonly ImageLayer[] =>
+  Array.isArray(layers) ? (layers as readonly ImageLayer[]) : [layers as ImageLayer];
 
 /** Shows some layers left of a divider and others right of it. A pointer or the arrow keys move the divider. Other layers of the map are not clipped. */
-export class swipe extends MapLayer<map, SwipeEvents> {
-  readonly #sides: readonly [readonly imageLayer[], readonly imageLayer[]];
+export class Swipe extends MapLayer<Map3D, SwipeEvents> {
+  readonly #sides: readonly [readonly ImageLayer[], readonly ImageLayer[]];
   readonly #divider: HTMLElement;
   #at: number;
 
@@ -46,12 +46,8 @@ export class swipe extends MapLayer<map, SwipeEvents> {
       icon(ARROWS),
     );
     if (names) this.#divider.setAttribute("aria-description", names.join(" | "));
-    this.#divider.addEventListener("pointerdown", (event) => {
-      this.#startDrag(event);
-    });
-    this.#divider.addEventListener("keydown", (event) => {
-      this.#onKeyDown(event);
-    });
+    this.#divider.addEventListener("pointerdown", (event) => this.#startDrag(event));
+    this.#divider.addEventListener("keydown", (event) => this.#onKeyDown(event));
   }
 
   /** Position of the divider: 0 is the left edge, 1 the right. */
@@ -68,7 +64,7 @@ export class swipe extends MapLayer<map, SwipeEvents> {
     return this.fire("change", { at: next });
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     adoptStyles(document, STYLES);
     this.#divider.setAttribute("aria-label", getCompareMessages(map.language).divider);
     map.overlayPane.append(this.#divider);
@@ -98,9 +94,7 @@ export class swipe extends MapLayer<map, SwipeEvents> {
       const box = this.map?.container.getBoundingClientRect();
       if (box) this.setAt((clientX - offset_px - box.left) / box.width);
     };
-    const end = (): void => {
-      divider.removeEventListener("pointermove", move);
-    };
+    const end = (): void => divider.removeEventListener("pointermove", move);
     divider.addEventListener("pointermove", move);
     divider.addEventListener("lostpointercapture", end, { once: true });
     event.preventDefault();

@@ -1,5 +1,5 @@
 import { adoptStyles, element } from "../core/dom";
-import { Evented, UsageError, type map, type Vec3 } from "../map3d";
+import { Evented, UsageError, type Map3D, type Vec3 } from "../map3d";
 import { describeDirection } from "./i18n";
 import { STYLES } from "./styles";
 
@@ -14,7 +14,7 @@ export interface SyncOptions {
 /** Events of `sync`. */
 export interface SyncEvents {
   /** Another map leads. */
-  lead: { map: map };
+  lead: { map: Map3D };
 }
 
 /** Heights that differ by less are the same. */
@@ -22,17 +22,17 @@ const SAME_M = 0.01;
 const TOUCHES = ["pointerdown", "wheel", "keydown"] as const;
 
 /** Moves several maps together: the same place at the centre and the same zoom, in directions of their own. The map that the user touched last leads. */
-export class sync extends Evented<SyncEvents> {
-  readonly #maps: readonly map[];
+export class Sync extends Evented<SyncEvents> {
+  readonly #maps: readonly Map3D[];
   readonly #turns: readonly number[];
   readonly #abort = new AbortController();
-  readonly #captions = new Map<map, HTMLElement>();
-  #leader: map;
+  readonly #captions = new Map<Map3D, HTMLElement>();
+  #leader: Map3D;
   /** Height of the surface at the centre, world; null until it is known. */
   #height: number | null = null;
 
   /** @throws UsageError for fewer than two maps, the same map twice, or turns that are not one number per map */
-  constructor(maps: readonly map[], { turns_deg = maps.map(() => 0), captions = false }: SyncOptions = {}) {
+  constructor(maps: readonly Map3D[], { turns_deg = maps.map(() => 0), captions = false }: SyncOptions = {}) {
     super();
     const [first] = maps;
     if (!first || maps.length < 2 || new Set(maps).size < maps.length)
@@ -52,12 +52,12 @@ export class sync extends Evented<SyncEvents> {
   }
 
   /** The map that the others follow. */
-  get leader(): map {
+  get leader(): Map3D {
     return this.#leader;
   }
 
   /** Makes another map the one that the others follow, for example before a script moves it. @throws UsageError for a map that is not among them */
-  lead(map: map): this {
+  lead(map: Map3D): this {
     if (!this.#maps.includes(map)) throw new UsageError("sync: this map is not among those that move together");
     if (map === this.#leader) return this;
     this.#leader = map;
@@ -80,16 +80,9 @@ export class sync extends Evented<SyncEvents> {
     return this;
   }
 
-  #listen(map: map): void {
+  #listen(map: Map3D): void {
     const { signal } = this.#abort;
-    for (const type of TOUCHES)
-      map.container.addEventListener(
-        type,
-        () => {
-          this.lead(map);
-        },
-        { capture: true, passive: true, signal },
-      );
+    for (const type of TOUCHES) map.container.addEventListener(type, () => this.lead(map), { capture: true, passive: true, signal });
     map.on("move", this.#follow).on("directionchange", this.#follow).on("ready", this.#follow).on("idle", this.#settle);
     map
       .on("directionchange", this.#describe)
@@ -100,7 +93,7 @@ export class sync extends Evented<SyncEvents> {
   }
 
   readonly #describe = ({ target }: { target: unknown }): void => {
-    const shown = target as map;
+    const shown = target as Map3D;
     const caption = this.#captions.get(shown);
     if (caption) caption.textContent = describeDirection(shown.lookAt_deg, shown.language);
   };
@@ -142,7 +135,7 @@ export class sync extends Evented<SyncEvents> {
 }
 
 /** Finds the direction of a map that is nearest to the leader's, turned, at the nearest pitch; null if it has none. */
-function findDirection(each: map, leader: map, turn_deg: number): string | null {
+function findDirection(each: Map3D, leader: Map3D, turn_deg: number): string | null {
   const from = leader.directions.find(({ id }) => id === leader.direction);
   if (!from) return null;
   const apart = (deg: number): number => Math.abs(((((deg - from.lookAtDeg - turn_deg) % 360) + 540) % 360) - 180);

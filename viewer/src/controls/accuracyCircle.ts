@@ -1,5 +1,5 @@
 import type { Vec3 } from "../core/vec";
-import type { map } from "../map3d";
+import type { Map3D } from "../map3d";
 
 const NS = "http://www.w3.org/2000/svg";
 const CORNERS = 64;
@@ -15,7 +15,7 @@ export class AccuracyCircle {
     this.#svg.setAttribute("aria-hidden", "true");
   }
 
-  addTo(map: map, [x, y, z]: Vec3, radius_m: number): void {
+  addTo(map: Map3D, [x, y, z]: Vec3, radius_m: number): void {
     const corners = Array.from({ length: CORNERS }, (_, k) => (2 * Math.PI * k) / CORNERS).map((angle): Vec3 => [
       x + radius_m * Math.cos(angle),
       y + radius_m * Math.sin(angle),
@@ -31,9 +31,7 @@ export class AccuracyCircle {
     this.remove();
     map.overlayPane.prepend(this.#svg);
     map.frameEvents.on("move", update);
-    this.#stopFollowing = () => {
-      map.frameEvents.off("move", update);
-    };
+    this.#stopFollowing = () => map.frameEvents.off("move", update);
     update();
   }
 

@@ -1,6 +1,6 @@
 import type { AddToCorner } from "../core/corner";
 import { adoptStyles, element } from "../core/dom";
-import { MapLayer, UsageError, type Corner, type map } from "../map3d";
+import { MapLayer, UsageError, type Corner, type Map3D } from "../map3d";
 import { STYLES } from "./styles";
 
 const CORNERS: readonly string[] = ["topleft", "topright", "bottomleft", "bottomright"];
@@ -27,7 +27,7 @@ export interface ControlOptions {
 }
 
 /** An element of the page's own in a corner of the map. */
-export class control extends MapLayer<map, object> {
+export class Control extends MapLayer<Map3D, object> {
   /** The element. */
   readonly element: HTMLElement;
   readonly #position: Corner;
@@ -39,7 +39,7 @@ export class control extends MapLayer<map, object> {
     this.#position = checkCorner(position);
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     addToCorner(map.controlPane, this.element, this.#position);
   }
 

@@ -1,5 +1,5 @@
 import type { Vec2, Vec3 } from "../core/vec";
-import type { map } from "../map3d";
+import type { Map3D } from "../map3d";
 
 const TOLERANCE_M = 0.5;
 
@@ -8,7 +8,7 @@ const TOLERANCE_M = 0.5;
  * through a point below the surface it hits something higher first. Returns the lowest height that was hit if the surface is hidden, and the scene's lowest
  * height if nothing was hit.
  */
-export async function findSurface(map: map, [x, y]: Vec2): Promise<Vec3> {
+export async function findSurface(map: Map3D, [x, y]: Vec2): Promise<Vec3> {
   const [lowest, highest] = heightRange(map);
   let [low, high, lowestHit] = [lowest, highest, Infinity];
   for (;;) {
@@ -24,7 +24,7 @@ export async function findSurface(map: map, [x, y]: Vec2): Promise<Vec3> {
 }
 
 /** Lowest and highest height of all layers. */
-function heightRange(map: map): [number, number] {
+function heightRange(map: Map3D): [number, number] {
   const boxes = map.layers.flatMap(({ rendering }) => (rendering ? [rendering.json] : []));
   return [
     Math.min(...boxes.map(({ origin, box }) => origin[2] + box[0][2])),

@@ -3,6 +3,6 @@ import { features } from "../map3d";
 import { addToCorner } from "./corners";
 
 features["controls"] = addToCorner;
-export { control, control as Control, type ControlOptions } from "./corners";
-export { locate, locate as Locate, type Located, type LocateEvents, type LocateOptions } from "./locate";
-export { overview, overview as Overview, type OverviewOptions } from "./overview";
+export { Control, Control as control, type ControlOptions } from "./corners";
+export { Locate, Locate as locate, type Located, type LocateEvents, type LocateOptions } from "./locate";
+export { Overview, Overview as overview, type OverviewOptions } from "./overview";

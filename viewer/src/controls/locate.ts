@@ -1,7 +1,7 @@
 import { addPanelButton } from "../core/panelButton";
 import { adoptStyles, element, iconButton } from "../core/dom";
 import type { Vec2, Vec3 } from "../core/vec";
-import { MapLayer, Map3dError, marker, type map } from "../map3d";
+import { MapLayer, Map3dError, Marker, type Map3D } from "../map3d";
 import { AccuracyCircle } from "./accuracyCircle";
 import { STYLES } from "./styles";
 import { findSurface } from "./findSurface";
@@ -36,14 +36,14 @@ const TIMEOUT_MS = 15_000;
 const TOLERANCE_DEG = 1e-5;
 
 /** A button that shows the user's location: a marker with an accuracy circle. A second press removes them. */
-export class locate extends MapLayer<map, LocateEvents> {
+export class Locate extends MapLayer<Map3D, LocateEvents> {
   readonly options: LocateOptions;
   readonly #status = element("p", "map3d-status", { role: "status" });
   readonly #circle = new AccuracyCircle();
   #button = element("button", "");
   #box: HTMLElement | undefined;
   #messages: ControlMessages | undefined;
-  #pin: marker | undefined;
+  #pin: Marker | undefined;
   #timer: ReturnType<typeof setTimeout> | undefined;
   #request = 0;
 
@@ -52,14 +52,12 @@ export class locate extends MapLayer<map, LocateEvents> {
     this.options = options;
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     const messages = (this.#messages = getControlMessages(this.options.language ?? map.language));
     adoptStyles(document, STYLES);
     this.#button = iconButton("", messages.locate, TARGET);
     this.#button.setAttribute("aria-pressed", "false");
-    this.#button.addEventListener("click", () => {
-      this.toggle();
-    });
+    this.#button.addEventListener("click", () => this.toggle());
     this.#box = addPanelButton(map, this.#button, this.#status);
   }
 
@@ -100,7 +98,7 @@ export class locate extends MapLayer<map, LocateEvents> {
   }
 
   async #locate(): Promise<Located> {
-    const [map, messages] = [this.map as map, this.#messages as ControlMessages];
+    const [map, messages] = [this.map as Map3D, this.#messages as ControlMessages];
     if (!map.fromLonLat([0, 0])) throw new Map3dError(messages.notGeoreferenced);
     if (!isSecureContext) throw new Map3dError(messages.insecure);
     const { latitude, longitude, accuracy } = (await queryPosition(messages)).coords;
@@ -111,11 +109,11 @@ export class locate extends MapLayer<map, LocateEvents> {
   }
 
   #show(located: Located): void {
-    const [map, messages] = [this.map as map, this.#messages as ControlMessages];
+    const [map, messages] = [this.map as Map3D, this.#messages as ControlMessages];
     const { position, accuracy_m } = located;
     this.#button.ariaPressed = "true";
     const metres = Math.round(accuracy_m).toLocaleString(this.options.language ?? map.language);
-    this.#pin = new marker(messages.here(`${metres} m`), position).addTo(map);
+    this.#pin = new Marker(messages.here(`${metres} m`), position).addTo(map);
     this.#circle.addTo(map, position, accuracy_m);
     const side = Math.min(map.container.clientWidth, map.container.clientHeight);
     const fitZoom = map.zoom + Math.log2((0.35 * side * map.metresPerPixel) / Math.max(accuracy_m, 1));
@@ -125,9 +123,7 @@ export class locate extends MapLayer<map, LocateEvents> {
 
   #fail(error: Error): void {
     this.#say(error.message);
-    this.#timer = setTimeout(() => {
-      this.#say("");
-    }, MESSAGE_MS);
+    this.#timer = setTimeout(() => this.#say(""), MESSAGE_MS);
     this.fire("error", { error });
   }
 
@@ -142,16 +138,14 @@ function queryPosition(messages: ControlMessages): Promise<GeolocationPosition> 
   return new Promise((resolve, reject) => {
     navigator.geolocation.getCurrentPosition(
       resolve,
-      ({ code, PERMISSION_DENIED }) => {
-        reject(new Map3dError(code === PERMISSION_DENIED ? messages.denied : messages.unavailable));
-      },
+      ({ code, PERMISSION_DENIED }) => reject(new Map3dError(code === PERMISSION_DENIED ? messages.denied : messages.unavailable)),
       { enableHighAccuracy: true, timeout: TIMEOUT_MS, maximumAge: 0 },
     );
   });
 }
 
 /** Is the position inside a layer's bounding box, and is its conversion accurate? */
-function isOnMap(map: map, [x, y]: Vec2, [lon, lat]: Vec2): boolean {
+function isOnMap(map: Map3D, [x, y]: Vec2, [lon, lat]: Vec2): boolean {
   const roundTrip = map.lonLat([x, y, 0]);
   if (!roundTrip || Math.abs(roundTrip[0] - lon) > TOLERANCE_DEG || Math.abs(roundTrip[1] - lat) > TOLERANCE_DEG) return false;
   return map.layers.some(({ rendering }) => {

@@ -1,7 +1,7 @@
 import { addPanelButton } from "../core/panelButton";
 import { adoptStyles, element, iconButton } from "../core/dom";
 import { add, dot, sub, type Box3, type Vec2 } from "../core/vec";
-import { MapLayer, map } from "../map3d";
+import { MapLayer, Map3D } from "../map3d";
 import { STYLES } from "./styles";
 import { getControlMessages } from "./i18n";
 
@@ -21,14 +21,14 @@ const ICON = "M3 6l6-2 6 2 6-2v14l-6 2-6-2-6 2zM9 4v14M15 6v14";
 const KEYS: Record<string, Vec2> = { ArrowLeft: [1, 0], ArrowRight: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 /** A small map of the whole scene with a frame around the current view. Drag the frame, or click to move there. */
-export class overview extends MapLayer<map, object> {
+export class Overview extends MapLayer<Map3D, object> {
   readonly options: OverviewOptions;
   readonly #pane = element("div", "map3d-overview-map");
   readonly #pad = element("div", "map3d-overview-pad", { tabindex: "0", role: "group" });
   readonly #frame = element("div", "map3d-overview-frame");
   #button = element("button", "");
   #box: HTMLElement | undefined;
-  #small: map | undefined;
+  #small: Map3D | undefined;
   #listeners = new AbortController();
 
   constructor(options: OverviewOptions = {}) {
@@ -36,16 +36,14 @@ export class overview extends MapLayer<map, object> {
     this.options = options;
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     this.#listeners = new AbortController();
     const messages = getControlMessages(this.options.language ?? map.language);
     adoptStyles(document, STYLES);
     this.#pad.setAttribute("aria-label", messages.move);
     this.#pad.replaceChildren(this.#frame);
     this.#button = iconButton("", messages.overview, ICON);
-    this.#button.addEventListener("click", () => {
-      this.toggle();
-    });
+    this.#button.addEventListener("click", () => this.toggle());
     this.#box = addPanelButton(map, this.#button, this.#pane);
     map.frameEvents.on("move", this.#placeFrame);
     map.on("directionchange", this.#fit);
@@ -55,7 +53,7 @@ export class overview extends MapLayer<map, object> {
     this.toggle(!(this.options.collapsed ?? map.container.clientWidth < NARROW_PX));
   }
 
-  protected onRemove(map: map): void {
+  protected onRemove(map: Map3D): void {
     this.#listeners.abort();
     this.toggle(false);
     map.frameEvents.off("move", this.#placeFrame);
@@ -83,7 +81,7 @@ export class overview extends MapLayer<map, object> {
     const shown = this.map;
     if (!shown?.getViewState() || this.#small || !this.open) return;
     const box = this.#pane.appendChild(element("div", ""));
-    const small = new map(box, {
+    const small = new Map3D(box, {
       controls: false,
       attribution: false,
       direction: shown.direction,
@@ -96,9 +94,7 @@ export class overview extends MapLayer<map, object> {
     this.#pane.append(this.#pad);
     this.#small = small;
     small.on("error", () => undefined); // the large map reports the same errors
-    small.on("ready", () => {
-      this.#fit();
-    });
+    small.on("ready", () => this.#fit());
     small.frameEvents.on("move", this.#placeFrame);
     for (const layer of shown.layers) layer.copy().setStyle({}).clearHighlight().addTo(small);
   };
@@ -132,8 +128,8 @@ export class overview extends MapLayer<map, object> {
     if (!shown || !small) return;
     const { right, up } = shown.camera.frame.axes;
     const shift = sub(shown.origin, small.origin);
-    const px_m = (this.#small as map).metresPerPixel;
-    const scale = (this.map as map).metresPerPixel / px_m;
+    const px_m = (this.#small as Map3D).metresPerPixel;
+    const scale = (this.map as Map3D).metresPerPixel / px_m;
     const x = (shown.camera.u + dot(right, shift) - small.camera.u) / px_m + small.camera.width / 2;
     const y = (small.camera.v - shown.camera.v - dot(up, shift)) / px_m + small.camera.height / 2;
     const [width, height] = [shown.camera.width * scale, shown.camera.height * scale];

@@ -86,9 +86,7 @@ function unfilter(bytes: Uint8Array, row: number, stride: number, channels: numb
 /** Writes `n` bytes at `to` from those at `from`, which comes after it; `c` bytes per pixel; the row above, if any, is `n` bytes before. */
 type Unfilter = (bytes: Uint8Array, from: number, to: number, n: number, c: number, above: boolean) => void;
 
-const plain: Unfilter = (out, from, to, n) => {
-  out.copyWithin(to, from, from + n);
-};
+const plain: Unfilter = (out, from, to, n) => out.copyWithin(to, from, from + n);
 
 const sub: Unfilter = (out, from, to, n, c) => {
   plain(out, from, to, n, c, false);

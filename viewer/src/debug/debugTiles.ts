@@ -1,29 +1,29 @@
 import { adoptStyles, element } from "../core/dom";
 import { tileName } from "../geo/frame";
-import { MapLayer, type map } from "../map3d";
+import { MapLayer, type Map3D } from "../map3d";
 import { STYLES } from "./styles";
 
-type Plan = map["plans"][number];
+type Plan = Map3D["plans"][number];
 
 /**
  * Outlines the drawn tiles and labels them with their names and, for each layer, the bytes received and how long ago. A fallback shows the
  * source tile's figures. A corner names the drawer.
  */
-export class debugTiles extends MapLayer<map, object> {
+export class DebugTiles extends MapLayer<Map3D, object> {
   readonly #pane = element("div", "map3d-debug", { "aria-hidden": "true" });
   readonly #update = (): void => {
-    const { plans, drawer } = this.map as map;
-    const boxes = plans.flatMap((plan) => plan.quads.map((quad) => outline(plan, quad, (this.map as map).getViewState()?.dpr ?? 1)));
+    const { plans, drawer } = this.map as Map3D;
+    const boxes = plans.flatMap((plan) => plan.quads.map((quad) => outline(plan, quad, (this.map as Map3D).getViewState()?.dpr ?? 1)));
     this.#pane.replaceChildren(...boxes, element("p", "", {}, String(drawer)));
   };
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     adoptStyles(document, STYLES);
     map.overlayPane.append(this.#pane);
     map.frameEvents.on("draw", this.#update);
   }
 
-  protected onRemove(map: map): void {
+  protected onRemove(map: Map3D): void {
     map.frameEvents.off("draw", this.#update);
     this.#pane.remove();
   }

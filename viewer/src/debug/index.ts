@@ -1,2 +1,2 @@
 /** map3d-debug: shows the tiles of a map, for developers. */
-export { debugTiles, debugTiles as DebugTiles } from "./debugTiles";
+export { DebugTiles, DebugTiles as debugTiles } from "./debugTiles";

@@ -40,9 +40,7 @@ export const enableDragging: EnableDragging = (handle, map, position, onDrag) =>
     if (drag.moved && end) {
       onDrag("dragend", end);
       // Suppresses the click that follows a drag.
-      const suppress = (click: Event): void => {
-        click.stopImmediatePropagation();
-      };
+      const suppress = (click: Event): void => click.stopImmediatePropagation();
       handle.addEventListener("click", suppress, { capture: true, once: true });
       setTimeout(() => {
         handle.removeEventListener("click", suppress, { capture: true });

@@ -1,4 +1,4 @@
-import { UsageError, type map } from "../map3d";
+import { UsageError, type Map3D } from "../map3d";
 
 /** Options of `embedCode`. */
 export interface EmbedOptions {
@@ -9,7 +9,7 @@ export interface EmbedOptions {
 }
 
 /** Returns the lines of HTML that show a map's present view and light in another page. @throws UsageError without a view or a folder */
-export function embedCode(map: map, { src, label }: EmbedOptions): string {
+export function embedCode(map: Map3D, { src, label }: EmbedOptions): string {
   const { center, light, time } = map;
   if (!center) throw new UsageError('embedCode: the map has no view yet; call it after "ready"');
   if (typeof src !== "string" || src === "")

@@ -1,13 +1,14 @@
 /** map3d-element: the custom elements `<map-3d>`, `<map-3d-layer>` and `<map-3d-marker>`. Importing it registers them. */
-import { layerElement } from "./layerElement";
-import { mapElement, type MapElementEvents } from "./mapElement";
-import { markerElement } from "./markerElement";
+import { LayerElement } from "./layerElement";
+import { MapElement, type MapElementEvents } from "./mapElement";
+import { MarkerElement } from "./markerElement";
 
-export { layerElement, mapElement, markerElement, type MapElementEvents };
-export type { part, ElementHost } from "./part";
+export { LayerElement, LayerElement as layerElement, MapElement, MapElement as mapElement, MarkerElement, MarkerElement as markerElement };
+export type { MapElementEvents };
+export type { Part, Part as part, ElementHost } from "./part";
 export { embedCode, type EmbedOptions } from "./embedCode";
 
-const ELEMENTS = { "map-3d": mapElement, "map-3d-layer": layerElement, "map-3d-marker": markerElement };
+const ELEMENTS = { "map-3d": MapElement, "map-3d-layer": LayerElement, "map-3d-marker": MarkerElement };
 
 // Skipped without a DOM (server-side rendering). A second copy of this script keeps the elements of the first.
 if ("customElements" in globalThis)
@@ -15,9 +16,9 @@ if ("customElements" in globalThis)
 
 declare global {
   interface HTMLElementTagNameMap {
-    "map-3d": mapElement;
-    "map-3d-layer": layerElement;
-    "map-3d-marker": markerElement;
+    "map-3d": MapElement;
+    "map-3d-layer": LayerElement;
+    "map-3d-marker": MarkerElement;
   }
   interface HTMLElementEventMap extends MapElementEvents {}
   interface DocumentEventMap extends MapElementEvents {}

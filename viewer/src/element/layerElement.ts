@@ -1,26 +1,26 @@
-import { imageLayer, UsageError } from "../map3d";
+import { ImageLayer, UsageError } from "../map3d";
 import { mode, number, words } from "./attributes";
-import { part, type ElementHost } from "./part";
+import { Part, type ElementHost } from "./part";
 
 /** `<map-3d-layer src="…" mode="…" opacity="…" attribution="…">` inside `<map-3d>`: a further rendering on the map. */
-export class layerElement extends part<imageLayer> {
+export class LayerElement extends Part<ImageLayer> {
   /** @internal */
   static readonly observedAttributes = ["src", "mode", "opacity", "attribution"];
 
   /** The layer; null while the element is not on a map. */
-  get layer(): imageLayer | null {
+  get layer(): ImageLayer | null {
     return this.item;
   }
 
-  protected create(): imageLayer {
+  protected create(): ImageLayer {
     return createLayer(this);
   }
 
-  protected update(layer: imageLayer, name: string): boolean {
+  protected update(layer: ImageLayer, name: string): boolean {
     return updateLayer(this, layer, name);
   }
 
-  protected added(layer: imageLayer, host: ElementHost): void {
+  protected added(layer: ImageLayer, host: ElementHost): void {
     host.watch(layer);
   }
 
@@ -30,7 +30,7 @@ export class layerElement extends part<imageLayer> {
 }
 
 /** Creates the layer that an element's attributes describe. @throws UsageError */
-export function createLayer(element: Element): imageLayer {
+export function createLayer(element: Element): ImageLayer {
   const [urls, opacity, shown, attribution] = [
     words(element, "src"),
     number(element, "opacity"),
@@ -38,7 +38,7 @@ export function createLayer(element: Element): imageLayer {
     element.getAttribute("attribution"),
   ];
   if (urls.length === 0) throw new UsageError(`<${element.localName}> needs the attribute src, the base URL of a rendering`);
-  return new imageLayer(urls, {
+  return new ImageLayer(urls, {
     ...(shown !== undefined && { mode: shown }),
     ...(opacity !== undefined && { opacity }),
     ...(attribution !== null && { attribution }),
@@ -46,7 +46,7 @@ export function createLayer(element: Element): imageLayer {
 }
 
 /** Applies a changed attribute to the layer. @returns false when the layer cannot change it  @throws UsageError */
-export function updateLayer(element: Element, layer: imageLayer, name: string): boolean {
+export function updateLayer(element: Element, layer: ImageLayer, name: string): boolean {
   if (name === "mode") layer.setMode(mode(element) ?? "lit");
   else if (name === "opacity") layer.setOpacity(number(element, name) ?? 1);
   else return false;

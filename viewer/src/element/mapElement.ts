@@ -1,10 +1,10 @@
 import {
   features,
   getFeature,
-  map,
+  Map3D,
   type Addable,
   type AnyPosition,
-  type imageLayer,
+  type ImageLayer,
   type Light,
   type MapEvents,
   type MapOptions,
@@ -13,7 +13,7 @@ import { findFirstSun } from "../geo/firstSun";
 import { isOn, light, number, PageElement, place, time, words } from "./attributes";
 import { ElementContent } from "./elementContent";
 import { updateLayer, createLayer } from "./layerElement";
-import type { part, ElementHost } from "./part";
+import type { Part, ElementHost } from "./part";
 import { showThumbnail } from "./thumbnail";
 
 /** Events of the element: the map's events with the prefix `map-` and their fields in `detail`. They bubble. */
@@ -38,7 +38,7 @@ const RECREATING: ReadonlySet<string> = new Set(["src", "language", "label", "co
 const APPLIED = ["direction", "center", "lonlat", "zoom", "light", "time", "mode", "opacity", "background"];
 
 /** A map that forwards its events to its element. */
-class forwardingMap extends map {
+class ForwardingMap extends Map3D {
   readonly forward: FireEvent | undefined;
 
   constructor(target: HTMLElement, options: MapOptions, forward: FireEvent) {
@@ -61,13 +61,13 @@ class forwardingMap extends map {
  * `<map-3d src="…">`: a map as an element, 24rem high unless a style sheet sets its height. It can contain `<map-3d-layer>`, `<map-3d-marker>` and fallback
  * content, which is shown when no map can be drawn. Attributes can change at any time; an invalid value fires `map-error` and is ignored.
  */
-export class mapElement extends PageElement implements ElementHost {
+export class MapElement extends PageElement implements ElementHost {
   /** @internal */
   static readonly observedAttributes: readonly string[] = [...RECREATING, ...APPLIED];
   #content: ElementContent | undefined;
-  #map: map | null = null;
-  #base: imageLayer | null = null;
-  #failed = new WeakSet<imageLayer>();
+  #map: Map3D | null = null;
+  #base: ImageLayer | null = null;
+  #failed = new WeakSet<ImageLayer>();
   readonly #added = new Set<string>();
   #drawn = false;
   /** True once the map has a view. */
@@ -79,12 +79,12 @@ export class mapElement extends PageElement implements ElementHost {
   #saved: SavedState = {};
 
   /** The map; null while the element is not in the page. */
-  get map(): map | null {
+  get map(): Map3D | null {
     return this.#map;
   }
 
   /** The layer of `src`, then those of `<map-3d-layer>`, then those that scripts have added. */
-  get layers(): readonly imageLayer[] {
+  get layers(): readonly ImageLayer[] {
     return this.#map?.layers ?? [];
   }
 
@@ -110,10 +110,7 @@ export class mapElement extends PageElement implements ElementHost {
     if (name === "src") this.#srcChanged = true;
     if (!this.#map) this.#saved = { ...this.#saved, [name]: undefined, ...(name === "light" && { time: undefined }) };
     else if (RECREATING.has(name)) this.#scheduleRenew();
-    else if (this.#ready)
-      this.#try(() => {
-        this.#apply(name);
-      });
+    else if (this.#ready) this.#try(() => this.#apply(name));
     else this.#scheduleRenew();
   }
 
@@ -123,7 +120,7 @@ export class mapElement extends PageElement implements ElementHost {
   }
 
   /** @internal */
-  watch(layer: imageLayer): void {
+  watch(layer: ImageLayer): void {
     layer.on("error", () => {
       if (!layer.rendering) this.#failed.add(layer);
       this.#updateContent();
@@ -142,7 +139,7 @@ export class mapElement extends PageElement implements ElementHost {
     this.#srcChanged = false;
     this.#content ??= new ElementContent(this);
     const options = this.#options();
-    const map = new forwardingMap(this.#content.createContainer(options.language), options, this.#dispatch);
+    const map = new ForwardingMap(this.#content.createContainer(options.language), options, this.#dispatch);
     this.#map = map;
     const base = words(this, "src").length > 0 && this.#try(() => createLayer(this));
     if (base) {
@@ -159,16 +156,10 @@ export class mapElement extends PageElement implements ElementHost {
   #addFeatures(): void {
     for (const name of FEATURES.filter((each) => isOn(this, each) && !this.#added.has(each))) {
       if (!(name in features) && document.readyState !== "complete") {
-        window.addEventListener(
-          "load",
-          () => {
-            this.#addFeatures();
-          },
-          { once: true },
-        );
+        window.addEventListener("load", () => this.#addFeatures(), { once: true });
         return;
       }
-      this.#try(() => this.#map?.add(new (getFeature(name, `<map-3d ${name}>`) as new () => Addable<map>)()));
+      this.#try(() => this.#map?.add(new (getFeature(name, `<map-3d ${name}>`) as new () => Addable<Map3D>)()));
       this.#added.add(name);
     }
   }
@@ -214,8 +205,8 @@ export class mapElement extends PageElement implements ElementHost {
   }
 
   /** Parts that are already defined; the others add themselves. */
-  #parts(selector: string): part<Addable<map>>[] {
-    return [...this.querySelectorAll<part<Addable<map>>>(selector)].filter((element) => "enter" in element);
+  #parts(selector: string): Part<Addable<Map3D>>[] {
+    return [...this.querySelectorAll<Part<Addable<Map3D>>>(selector)].filter((element) => "enter" in element);
   }
 
   // Attributes
@@ -241,7 +232,7 @@ export class mapElement extends PageElement implements ElementHost {
 
   /** Applies a changed attribute to the map. A removed attribute changes nothing, except for those of the layer. @throws UsageError */
   #apply(name: string): void {
-    const map = this.#map as map;
+    const map = this.#map as Map3D;
     const value = this.getAttribute(name);
     if (this.#base && (name === "mode" || name === "opacity")) updateLayer(this, this.#base, name);
     else if (value === null) return;
@@ -255,7 +246,7 @@ export class mapElement extends PageElement implements ElementHost {
 
   /** Sets the light of the attributes, else that of rendered shadows. @throws UsageError */
   #startLight(): void {
-    const [map, rendering] = [this.#map as map, this.#base?.rendering];
+    const [map, rendering] = [this.#map as Map3D, this.#base?.rendering];
     if (this.hasAttribute("time")) this.#apply("time");
     const sun = this.hasAttribute("time") || this.hasAttribute("light") ? undefined : findFirstSun(rendering?.json.layers ?? []);
     if (!sun) return;
@@ -287,10 +278,7 @@ export class mapElement extends PageElement implements ElementHost {
     this.#ready = true;
     const { light: savedLight, time: savedTime } = this.#saved;
     if (savedTime) this.#try(() => this.#map?.setTime(savedTime));
-    else if (!savedLight)
-      this.#try(() => {
-        this.#startLight();
-      });
+    else if (!savedLight) this.#try(() => this.#startLight());
     this.#saved = {};
     this.#updateContent();
   }

@@ -1,33 +1,33 @@
-import { marker, UsageError, type AnyPosition } from "../map3d";
+import { Marker, UsageError, type AnyPosition } from "../map3d";
 import { place } from "./attributes";
-import { part, type ElementHost } from "./part";
+import { Part, type ElementHost } from "./part";
 
 /**
  * `<map-3d-marker position="x y z" label="…" color="…" open>` inside `<map-3d>`: a labelled position in the scene's CRS, metres; or with `lonlat="longitude latitude"`, or `object="gml:id"`. Its content is shown in a
  * popup, which `open` opens at once. The content is moved to the popup, not copied, and moves back when the marker leaves the map.
  */
-export class markerElement extends part<marker> {
+export class MarkerElement extends Part<Marker> {
   /** @internal */
   static readonly observedAttributes = ["position", "lonlat", "object", "label", "color", "open"];
   #body: HTMLElement | null = null;
   #observer: MutationObserver | null = null;
 
   /** The marker; null while the element is not on a map. */
-  get marker(): marker | null {
+  get marker(): Marker | null {
     return this.item;
   }
 
-  protected create(): marker {
+  protected create(): Marker {
     const [label, at, color] = [this.getAttribute("label")?.trim() ?? "", this.#place, this.getAttribute("color")];
     if (label === "") throw new UsageError("<map-3d-marker> needs the attribute label, its visible and accessible name");
     if (!at)
       throw new UsageError(
         `<map-3d-marker label="${label}"> needs the attribute position: x, y and z in the scene's CRS, such as "691000 5336000 520"; or lonlat, such as "11.42 48.76"; or object, such as a gml:id`,
       );
-    return new marker(label, at, color === null ? {} : { color });
+    return new Marker(label, at, color === null ? {} : { color });
   }
 
-  protected update(item: marker, name: string): boolean {
+  protected update(item: Marker, name: string): boolean {
     const [label, at] = [this.getAttribute("label")?.trim() ?? "", this.#place];
     if (label === "" || !at || name === "color") return false;
     if (name === "label") item.setLabel(label);
@@ -46,11 +46,9 @@ export class markerElement extends part<marker> {
     return host.map !== null && host.drawn;
   }
 
-  protected added(item: marker): void {
+  protected added(item: Marker): void {
     this.#body ??= document.createElement("div");
-    this.#observer = new MutationObserver(() => {
-      this.#moveContent(item);
-    });
+    this.#observer = new MutationObserver(() => this.#moveContent(item));
     this.#observer.observe(this, { childList: true });
     this.#moveContent(item);
   }
@@ -62,7 +60,7 @@ export class markerElement extends part<marker> {
   }
 
   /** Moves the element's content to the popup, now and when it changes. */
-  #moveContent(item: marker): void {
+  #moveContent(item: Marker): void {
     const body = this.#body;
     if (!body) return;
     const wasEmpty = !hasContent(body);

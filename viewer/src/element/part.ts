@@ -1,20 +1,20 @@
-import type { Addable, imageLayer, map } from "../map3d";
+import type { Addable, ImageLayer, Map3D } from "../map3d";
 import { PageElement } from "./attributes";
 
 /** The `<map-3d>` that contains a part. */
 export interface ElementHost {
   /** null while the element is not in the page. */
-  readonly map: map | null;
+  readonly map: Map3D | null;
   /** True while the map, not the fallback content, is shown. */
   readonly drawn: boolean;
   /** @internal Observes whether a layer loads. */
-  watch(layer: imageLayer): void;
+  watch(layer: ImageLayer): void;
   /** @internal Fires the event `map-error`. */
   report(reason: unknown): void;
 }
 
 /** An element inside `<map-3d>` that adds an item to its map. */
-export abstract class part<T extends Addable<map>> extends PageElement {
+export abstract class Part<T extends Addable<Map3D>> extends PageElement {
   #item: T | null = null;
   #host: ElementHost | null = null;
   #scheduled = false;

@@ -1,6 +1,6 @@
-import type { imageLayer, map } from "../map3d";
+import type { ImageLayer, Map3D } from "../map3d";
 
-type ViewState = NonNullable<ReturnType<map["getViewState"]>>;
+type ViewState = NonNullable<ReturnType<Map3D["getViewState"]>>;
 
 /** While the sun is lower, level ground has less than half of the light that it has in thumbnails. */
 const LOWEST_SUN_DEG = 10;
@@ -11,7 +11,7 @@ const THUMBNAIL = /^\[\[([\d.]+),([\d.]+),([\d.]+),([\d.]+)],"([\w+/=]+)"]$/;
  * Shows the thumbnail of a layer's view behind the canvas until everything in view is drawn. It is the map's background, so that it takes no room and no
  * pointer events. None is shown when it is malformed, and when the layer looks different: in another mode, or in low light.
  */
-export function showThumbnail(map: map, layer: imageLayer): void {
+export function showThumbnail(map: Map3D, layer: ImageLayer): void {
   const { style } = map.container;
   const update = (): void => {
     const [{ rendering }, { frame, u, v, zoom, width, height }] = [layer, (map.getViewState() as ViewState).camera];

@@ -2,7 +2,7 @@ import { addPanelButton } from "../core/panelButton";
 import { adoptStyles, element, iconButton } from "../core/dom";
 import { asError } from "../core/errors";
 import { add } from "../core/vec";
-import { MapLayer, imageLayer, type ImageLayerOptions, type map } from "../map3d";
+import { MapLayer, ImageLayer, type ImageLayerOptions, type Map3D } from "../map3d";
 import { FilesError, filesSource, joinPaths } from "./filesSource";
 import { DroppedEntries, MANIFEST, type Folder } from "./folder";
 import { STYLES } from "./styles";
@@ -19,13 +19,13 @@ export interface DropOptions {
   /** Options of the new layer. Default: those of an image layer. */
   layer?: ImageLayerOptions;
   /** Layer that the first opened folder replaces. Default: none, so that the folder is added to the map's layers. */
-  instead?: imageLayer;
+  instead?: ImageLayer;
 }
 
 /** Events of `dropFiles`. */
 export interface DropEvents {
   /** A folder was dropped or chosen, and is on the map. */
-  dropped: { layer: imageLayer };
+  dropped: { layer: ImageLayer };
   /** The files cannot be shown, and the map is unchanged. The message is shown beside the button, too. */
   error: { error: Error };
 }
@@ -34,14 +34,14 @@ const FOLDER = "M3 7a2 2 0 0 1 2-2h4l2 2h8a2 2 0 0 1 2 2v8a2 2 0 0 1-2 2H5a2 2 0
 const MESSAGE_MS = 12_000;
 
 /** Shows a published folder that is dropped on the map or chosen with a button. Each opened folder replaces the previous one. */
-export class dropFiles extends MapLayer<map, DropEvents> {
+export class DropFiles extends MapLayer<Map3D, DropEvents> {
   readonly options: DropOptions;
   readonly #status = element("p", "map3d-status", { role: "status" });
   readonly #input = element("input", "", { type: "file", multiple: "", webkitdirectory: "", hidden: "", tabindex: "-1" });
   readonly #over = element("div", "map3d-drop", { "aria-hidden": "true" });
   #box: HTMLElement | undefined;
   #listeners = new AbortController();
-  #layer: imageLayer | undefined;
+  #layer: ImageLayer | undefined;
   #request = 0;
   #timer: ReturnType<typeof setTimeout> | undefined;
 
@@ -55,19 +55,19 @@ export class dropFiles extends MapLayer<map, DropEvents> {
   }
 
   /** The layer of the folder that was opened last; undefined before. */
-  get layer(): imageLayer | undefined {
+  get layer(): ImageLayer | undefined {
     return this.#layer;
   }
 
   /** Opens files as if they were dropped. On an error the map is unchanged. @throws FilesError, ManifestError, FetchError or DecodeError */
-  async open(files: Iterable<File> | Folder): Promise<imageLayer> {
+  async open(files: Iterable<File> | Folder): Promise<ImageLayer> {
     const request = ++this.#request;
     const source = filesSource(files);
     await source.manifest();
     const map = this.map;
     if (!map || request !== this.#request)
       throw new DOMException("other files were opened in the meantime, or the map was removed", "AbortError");
-    const [before, layer] = [this.#layer ?? this.options.instead, new imageLayer(source, this.options.layer)];
+    const [before, layer] = [this.#layer ?? this.options.instead, new ImageLayer(source, this.options.layer)];
     before?.remove();
     if (map.layers.length === 0) map.resetView();
     try {
@@ -83,7 +83,7 @@ export class dropFiles extends MapLayer<map, DropEvents> {
     return layer;
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     adoptStyles(document, STYLES);
     const messages = getFilesMessages(this.options.language ?? map.language);
     this.#over.textContent = messages.drop;
@@ -91,9 +91,7 @@ export class dropFiles extends MapLayer<map, DropEvents> {
     map.container.append(this.#over, this.#input);
     if (this.options.button ?? true) {
       const button = iconButton("", messages.open, FOLDER);
-      button.addEventListener("click", () => {
-        this.#input.click();
-      });
+      button.addEventListener("click", () => this.#input.click());
       this.#box = addPanelButton(map, button, this.#status);
     }
     this.#listeners = new AbortController();
@@ -110,9 +108,7 @@ export class dropFiles extends MapLayer<map, DropEvents> {
   }
 
   #listen(target: HTMLElement, signal: AbortSignal): void {
-    const over = (active: boolean): void => {
-      this.#over.toggleAttribute("data-over", active);
-    };
+    const over = (active: boolean): unknown => this.#over.toggleAttribute("data-over", active);
     const listen = (type: "dragenter" | "dragover" | "drop", handle: (event: DragEvent) => void): void => {
       target.addEventListener(
         type,
@@ -156,9 +152,7 @@ export class dropFiles extends MapLayer<map, DropEvents> {
   #fail(error: Error): void {
     const messages = getFilesMessages(this.options.language ?? this.map?.language ?? "en");
     this.#say(error instanceof FilesError ? messages[error.problem](joinPaths(error.paths)) : `${messages.failed}: ${error.message}`);
-    this.#timer = setTimeout(() => {
-      this.#say("");
-    }, MESSAGE_MS);
+    this.#timer = setTimeout(() => this.#say(""), MESSAGE_MS);
     this.fire("error", { error });
   }
 
@@ -169,20 +163,14 @@ export class dropFiles extends MapLayer<map, DropEvents> {
 }
 
 /** Adds a layer to a map; settles when its manifest is read or rejected. */
-function addLayer(layer: imageLayer, map: map): Promise<void> {
+function addLayer(layer: ImageLayer, map: Map3D): Promise<void> {
   return new Promise((resolve, reject) => {
-    layer
-      .once("ready", () => {
-        resolve();
-      })
-      .once("error", ({ error }) => {
-        reject(error);
-      });
+    layer.once("ready", () => resolve()).once("error", ({ error }) => reject(error));
     layer.addTo(map);
   });
 }
 
-function fitToLayer(map: map, { rendering }: imageLayer): void {
+function fitToLayer(map: Map3D, { rendering }: ImageLayer): void {
   if (!rendering) return;
   const {
     origin,

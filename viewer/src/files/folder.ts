@@ -61,9 +61,7 @@ export class DroppedEntries {
         if (!root) return null;
         const entry = isDirectory(root) && rest.length > 0 ? await getFile(root, rest.join("/")) : root;
         return entry?.isFile === true
-          ? await new Promise<File>((resolve, reject) => {
-              (entry as FileSystemFileEntry).file(resolve, reject);
-            })
+          ? await new Promise<File>((resolve, reject) => (entry as FileSystemFileEntry).file(resolve, reject))
           : null;
       },
     };
@@ -87,9 +85,7 @@ async function readEntries(directory: FileSystemDirectoryEntry): Promise<FileSys
   const reader = directory.createReader();
   const all: FileSystemEntry[] = [];
   for (;;) {
-    const batch = await new Promise<FileSystemEntry[]>((resolve, reject) => {
-      reader.readEntries(resolve, reject);
-    });
+    const batch = await new Promise<FileSystemEntry[]>((resolve, reject) => reader.readEntries(resolve, reject));
     if (batch.length === 0) return all;
     all.push(...batch);
   }

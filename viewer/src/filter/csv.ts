@@ -1,4 +1,4 @@
-import type { Attribute, imageLayer, map, ObjectInfo } from "../map3d";
+import type { Attribute, ImageLayer, Map3D, ObjectInfo } from "../map3d";
 
 /** Number of objects whose attributes are read at a time. */
 const AT_ONCE = 32;
@@ -18,7 +18,7 @@ export function toCsv(objects: readonly (readonly [id: number, object: ObjectInf
 }
 
 /** Writes the objects in view as CSV, the largest first, or some objects of a layer, such as the selected ones. Fetches the ids in view and the attributes. */
-export async function exportCsv(map: map, { layer, ids }: CsvOptions = {}): Promise<string> {
+export async function exportCsv(map: Map3D, { layer, ids }: CsvOptions = {}): Promise<string> {
   const first = layer ?? map.layers[0];
   const wanted =
     ids && first ? ids.map((id) => ({ id, layer: first })) : (await map.objectsInView()).filter((seen) => !layer || seen.layer === layer);
@@ -33,7 +33,7 @@ export async function exportCsv(map: map, { layer, ids }: CsvOptions = {}): Prom
 /** Options of `exportCsv`. */
 export interface CsvOptions {
   /** Layer of the objects. Default: all layers, or the map's first one with `ids`. */
-  layer?: imageLayer;
+  layer?: ImageLayer;
   /** Objects to write. Default: those in view. */
   ids?: readonly number[];
 }

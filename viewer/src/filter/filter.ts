@@ -1,5 +1,5 @@
 import { asError } from "../core/errors";
-import { MapLayer, type imageLayer, type map } from "../map3d";
+import { MapLayer, type ImageLayer, type Map3D } from "../map3d";
 import { checkExpression, type FilterExpression } from "./expression";
 import { findObjects } from "./findObjects";
 
@@ -18,13 +18,13 @@ export interface FilterEvents {
 }
 
 /** Shows only the objects of a layer that fulfil an expression. Replaces the layer's style. */
-export class filter extends MapLayer<map, FilterEvents> {
+export class Filter extends MapLayer<Map3D, FilterEvents> {
   readonly options: Required<FilterOptions>;
-  readonly #layer: imageLayer;
+  readonly #layer: ImageLayer;
   #expression: FilterExpression;
 
   /** @throws UsageError for a wrong expression */
-  constructor(layer: imageLayer, expression: FilterExpression, options: FilterOptions = {}) {
+  constructor(layer: ImageLayer, expression: FilterExpression, options: FilterOptions = {}) {
     super();
     checkExpression(expression);
     this.options = { others: "dimmed", ...options };
@@ -43,7 +43,7 @@ export class filter extends MapLayer<map, FilterEvents> {
     return this;
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     this.#apply(map);
   }
 
@@ -51,7 +51,7 @@ export class filter extends MapLayer<map, FilterEvents> {
     this.#layer.setStyle({});
   }
 
-  #apply(map: map): void {
+  #apply(map: Map3D): void {
     const expression = this.#expression;
     findObjects(this.#layer, expression)
       .then((ids) => {

@@ -1,8 +1,8 @@
-import { UsageError, type AttributeInfo, type AttributeValue, type imageLayer } from "../map3d";
+import { UsageError, type AttributeInfo, type AttributeValue, type ImageLayer } from "../map3d";
 import { checkExpression, matches, type FilterExpression } from "./expression";
 
 /** Attributes by name; an object's own attribute comes before a property of every object. */
-async function findAttributes(layer: imageLayer, names: ReadonlySet<string>): Promise<AttributeInfo[]> {
+async function findAttributes(layer: ImageLayer, names: ReadonlySet<string>): Promise<AttributeInfo[]> {
   if (!layer.rendering) await new Promise((ready) => layer.once("ready", ready));
   const all = await layer.attributes();
   return [...names].map((name) => {
@@ -16,7 +16,7 @@ async function findAttributes(layer: imageLayer, names: ReadonlySet<string>): Pr
  * Finds the objects of a layer that fulfil an expression, among all that have any of its attributes. In a large rendering it reads the files of all values of
  * these attributes. Returns their ids. @param ids looks at these objects only, and reads only their files  @throws UsageError for an unknown attribute or a wrong expression
  */
-export async function findObjects(layer: imageLayer, expression: FilterExpression, ids?: readonly number[]): Promise<number[]> {
+export async function findObjects(layer: ImageLayer, expression: FilterExpression, ids?: readonly number[]): Promise<number[]> {
   const infos = await findAttributes(layer, checkExpression(expression));
   const columns = new Map<string, ReadonlyMap<number, AttributeValue>>(
     await Promise.all(infos.map(async (info) => [info.name, await layer.column(info, ids)] as const)),

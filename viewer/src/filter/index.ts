@@ -1,5 +1,5 @@
 /** map3d-filter: shows and finds objects by their attributes, and writes them as a table. */
-export { filter, filter as Filter, type FilterEvents, type FilterOptions } from "./filter";
+export { Filter, Filter as filter, type FilterEvents, type FilterOptions } from "./filter";
 export { findObjects } from "./findObjects";
 export type { FilterExpression } from "./expression";
 export { exportCsv, toCsv, type CsvOptions } from "./csv";

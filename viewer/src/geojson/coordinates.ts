@@ -1,5 +1,5 @@
 import { add, sub, type Vec2, type Vec3 } from "../core/vec";
-import { UsageError, type map } from "../map3d";
+import { UsageError, type Map3D } from "../map3d";
 import type { Coordinate } from "./parse";
 
 /** Range of the scene's coordinate polynomials in degrees; beyond it, positions are extrapolated linearly. */
@@ -11,7 +11,7 @@ const MAX_DISTANCE_M = 1e8;
 export type CoordinateTransform = (coordinate: Coordinate) => Vec3 | null;
 
 /** Creates the transform to local coordinates. @param origin world  @throws UsageError when the rendering has no geographic coordinates */
-export function coordinateTransform(map: Pick<map, "lonLat" | "fromLonLat">, origin: Vec3, crs: "lonlat" | "scene"): CoordinateTransform {
+export function coordinateTransform(map: Pick<Map3D, "lonLat" | "fromLonLat">, origin: Vec3, crs: "lonlat" | "scene"): CoordinateTransform {
   if (crs === "scene") return (coordinate) => ifNear(sub(coordinate, origin));
   const [middle, start] = [map.lonLat(origin), map.lonLat(origin) && map.fromLonLat(map.lonLat(origin) as Vec2)];
   if (!middle || !start)

@@ -46,15 +46,9 @@ export class FeatureList {
 
   #add(placed: PlacedFeature): { row: HTMLElement; button: HTMLButtonElement } {
     const button = element("button", "", { type: "button" }, this.#nameOf(placed));
-    button.addEventListener("focus", () => {
-      this.#onFocus(placed);
-    });
-    button.addEventListener("blur", () => {
-      this.#onFocus(null);
-    });
-    button.addEventListener("click", () => {
-      this.#onPress(placed);
-    });
+    button.addEventListener("focus", () => this.#onFocus(placed));
+    button.addEventListener("blur", () => this.#onFocus(null));
+    button.addEventListener("click", () => this.#onPress(placed));
     const entry = { row: element("li", "", {}, button), button };
     this.#rows.set(placed, entry);
     this.box.append(entry.row);

@@ -1,6 +1,6 @@
 import { adoptStyles } from "../core/dom";
 import { add, type Box3, type Vec2, type Vec3 } from "../core/vec";
-import { MapLayer, FetchError, UsageError, type map, type marker, type Relief } from "../map3d";
+import { MapLayer, FetchError, UsageError, type Map3D, type Marker, type Relief } from "../map3d";
 import { FeatureRenderer } from "./featureRenderer";
 import { anchorOf, hitTest } from "./hitTest";
 import { FeatureList } from "./featureList";
@@ -15,7 +15,7 @@ export interface GeojsonOptions {
   /** Style of all features, or a function of the feature. Default: see the fields of the style. */
   style?: FeatureStyle | ((feature: Feature) => FeatureStyle);
   /** Returns a marker for a point, or null for a dot. Default: dots. */
-  pointToMarker?: (feature: Feature, position: Vec3) => marker | null;
+  pointToMarker?: (feature: Feature, position: Vec3) => Marker | null;
   /** Returns false for features to leave out. Default: all are shown. */
   filter?: (feature: Feature) => boolean;
   /** Called for each feature that is shown. Default: none. */
@@ -54,7 +54,7 @@ export interface GeojsonEvents {
 }
 
 /** Shows GeoJSON on the map: points, lines and polygons, draped on the surface or at their own heights, and hidden behind buildings. */
-export class geojson extends MapLayer<map, GeojsonEvents> {
+export class GeoJSON extends MapLayer<Map3D, GeojsonEvents> {
   readonly needs = ["depth"] as const;
   readonly options: GeojsonOptions;
   readonly #data: unknown;
@@ -62,7 +62,7 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
   #style: GeojsonOptions["style"];
   #load: AbortController | undefined;
   #placed: readonly PlacedFeature[] = [];
-  #markers: { marker: marker; dot: FeatureDot; height: number }[] = [];
+  #markers: { marker: Marker; dot: FeatureDot; height: number }[] = [];
   #list: FeatureList | undefined;
   #origin: Vec3 = [0, 0, 0];
   #bounds: Box3 | null = null;
@@ -85,7 +85,7 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
   }
 
   /** The markers that `pointToMarker` returned. */
-  get markers(): readonly marker[] {
+  get markers(): readonly Marker[] {
     return this.#markers.map(({ marker }) => marker);
   }
 
@@ -105,7 +105,7 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
     return this;
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     adoptStyles(document, STYLES);
     map.overlayPane.prepend(this.#renderer.canvas);
     map.frameEvents.on("draw", this.#draw);
@@ -120,7 +120,7 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
     });
   }
 
-  protected onRemove(map: map): void {
+  protected onRemove(map: Map3D): void {
     this.#load?.abort();
     cancelAnimationFrame(this.#next);
     this.#clearHover();
@@ -133,16 +133,11 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
     [this.#markers, this.#placed] = [[], []];
   }
 
-  async #start(map: map, signal: AbortSignal): Promise<void> {
+  async #start(map: Map3D, signal: AbortSignal): Promise<void> {
     const data = typeof this.#data === "string" ? await fetchJson(this.#data, signal) : this.#data;
     const { crs = "lonlat", filter } = this.options;
     const { shapes, skipped } = readGeojson(data, crs === "lonlat");
-    if (!map.relief)
-      await new Promise<void>((ready) =>
-        map.once("ready", () => {
-          ready();
-        }),
-      );
+    if (!map.relief) await new Promise<void>((ready) => map.once("ready", () => ready()));
     const { relief } = map;
     if (signal.aborted || !relief) return;
     this.#addFeatures(map, relief, filter ? shapes.filter(({ feature }) => filter(feature)) : shapes, crs);
@@ -150,7 +145,7 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
     map.layerContext?.requestFrame();
   }
 
-  #addFeatures(map: map, relief: Relief, shapes: readonly FeatureShape[], crs: "lonlat" | "scene"): void {
+  #addFeatures(map: Map3D, relief: Relief, shapes: readonly FeatureShape[], crs: "lonlat" | "scene"): void {
     const transform = coordinateTransform(map, relief.origin, crs);
     const { height, pointToMarker, onEachFeature, interactive, name = nameOf } = this.options;
     this.#origin = relief.origin;
@@ -161,15 +156,11 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
     const messages = getGeojsonMessages(map.language);
     const numbers = new Map(this.#placed.map((placed, k) => [placed, k + 1]));
     if (interactive !== false) {
-      const press = (placed: PlacedFeature): void => {
-        this.#fire("click", placed, anchorOf(placed, map.relief ?? relief) ?? [0, 0]);
-      };
+      const press = (placed: PlacedFeature): void => this.#fire("click", placed, anchorOf(placed, map.relief ?? relief) ?? [0, 0]);
       this.#list = new FeatureList(
         messages.features,
         (placed) => name(placed.feature) || messages.feature(String(numbers.get(placed) ?? 0)),
-        (placed) => {
-          this.#focus(placed);
-        },
+        (placed) => this.#focus(placed),
         press,
       );
       map.overlayPane.append(this.#list.box);
@@ -178,7 +169,7 @@ export class geojson extends MapLayer<map, GeojsonEvents> {
   }
 
   /** Replaces dots of a feature with markers. */
-  #addMarkers(map: map, relief: Relief, placed: PlacedFeature, make: NonNullable<GeojsonOptions["pointToMarker"]>): PlacedFeature {
+  #addMarkers(map: Map3D, relief: Relief, placed: PlacedFeature, make: NonNullable<GeojsonOptions["pointToMarker"]>): PlacedFeature {
     const dots = placed.dots.filter((dot) => {
       const marker = make(placed.feature, worldOf(this.#origin, dot.position, relief.heights[0]));
       if (marker) this.#markers.push({ marker, dot, height: NaN });

@@ -38,9 +38,7 @@ interface GeometryCollector {
 /** Reads a FeatureCollection, Feature or geometry. Skips and counts invalid geometries. @param geographic coordinates are longitudes and latitudes  @throws UsageError when the data is not GeoJSON */
 export function readGeojson(data: unknown, geographic: boolean): { shapes: FeatureShape[]; skipped: Skipped } {
   const skipped = new Map<string, number>();
-  const skip = (reason: string): void => {
-    skipped.set(reason, (skipped.get(reason) ?? 0) + 1);
-  };
+  const skip = (reason: string): unknown => skipped.set(reason, (skipped.get(reason) ?? 0) + 1);
   const valid = geographic ? onEarth : (): boolean => true;
   const shapes = featuresOf(data, skip).flatMap((feature) => {
     const collector: GeometryCollector = { points: [], lines: [], polygons: [], skip, valid };

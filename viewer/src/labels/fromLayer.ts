@@ -1,5 +1,5 @@
 import { add } from "../core/vec";
-import type { imageLayer, map, ObjectInfo } from "../map3d";
+import type { ImageLayer, Map3D, ObjectInfo } from "../map3d";
 import { properName, type Label } from "./label";
 
 /** Objects that cover less of the screen are not read. */
@@ -10,19 +10,19 @@ const GROUND = ["terrain", "relief"];
 
 /** Names the objects of a layer that are in view. */
 export class ObjectLabels {
-  readonly #layer: imageLayer;
+  readonly #layer: ImageLayer;
   readonly #name: (object: ObjectInfo, id: number) => string;
   /** Labels by the id of the outermost object; null: it has no name. */
   readonly #known = new Map<number, Label | null>();
   /** Outermost objects of parts. */
   readonly #roots = new Map<number, number>();
 
-  constructor(layer: imageLayer, name: (object: ObjectInfo, id: number) => string) {
+  constructor(layer: ImageLayer, name: (object: ObjectInfo, id: number) => string) {
     [this.#layer, this.#name] = [layer, name];
   }
 
   /** Reads the names of the largest objects in view; returns all names read so far. */
-  async read(map: map): Promise<readonly Label[]> {
+  async read(map: Map3D): Promise<readonly Label[]> {
     const seen = (await map.objectsInView()).filter(({ layer, share }) => layer === this.#layer && share >= LEAST_SHARE).slice(0, MOST);
     for (const { id } of seen) if (!this.#roots.has(id)) await this.#readObject(id);
     return [...this.#known.values()].filter((label) => label !== null);

@@ -3,7 +3,7 @@ import { asError } from "../core/errors";
 import { addPanelButton } from "../core/panelButton";
 import { sub, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
-import { findHeight, MapLayer, type imageLayer, type map, type ObjectInfo, type Relief } from "../map3d";
+import { findHeight, MapLayer, type ImageLayer, type Map3D, type ObjectInfo, type Relief } from "../map3d";
 import { labelFeatures, nameOf, type LabelledFeature } from "./fromGeoJson";
 import { nameOfObject, ObjectLabels } from "./fromLayer";
 import { getLabelsMessage } from "./i18n";
@@ -42,7 +42,7 @@ interface Placed {
 }
 
 /** The labels of each map, which leave room for each other. */
-const peers = new WeakMap<map, Set<labels>>();
+const peers = new WeakMap<Map3D, Set<Labels>>();
 
 const ICON = "M5 19L11 5h2l6 14M7.5 14h9";
 const HEIGHT_PX = 16;
@@ -52,10 +52,10 @@ const MARGIN_PX = 120;
 const RISE_PX = 4;
 
 /** Shows names at their places: of a layer's objects, or of GeoJSON. Labels behind buildings are hidden, and none overlap. */
-export class labels extends MapLayer<map, LabelsEvents> {
+export class Labels extends MapLayer<Map3D, LabelsEvents> {
   readonly needs = ["depth"] as const;
   readonly options: LabelsOptions;
-  readonly #source: imageLayer | string | object;
+  readonly #source: ImageLayer | string | object;
   readonly #pane = element("div", "map3d-labels", { "aria-hidden": "true" });
   readonly #pen = document.createElement("canvas").getContext("2d");
   #placed = new Map<string, Placed>();
@@ -65,7 +65,7 @@ export class labels extends MapLayer<map, LabelsEvents> {
   #shown: boolean;
 
   /** @param source an image layer, a URL of GeoJSON, or a FeatureCollection */
-  constructor(source: imageLayer | string | object, options: LabelsOptions = {}) {
+  constructor(source: ImageLayer | string | object, options: LabelsOptions = {}) {
     super();
     [this.#source, this.options, this.#shown] = [source, options, options.shown ?? true];
   }
@@ -93,7 +93,7 @@ export class labels extends MapLayer<map, LabelsEvents> {
     return this.fire("toggle", { shown });
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     adoptStyles(document, STYLES);
     map.overlayPane.prepend(this.#pane);
     peers.set(map, (peers.get(map) ?? new Set()).add(this));
@@ -104,7 +104,7 @@ export class labels extends MapLayer<map, LabelsEvents> {
     this.toggle(this.#shown);
   }
 
-  protected onRemove(map: map): void {
+  protected onRemove(map: Map3D): void {
     map.frameEvents.off("move", this.#move);
     map.frameEvents.off("draw", this.#draw);
     map.off("idle", this.#rest);
@@ -116,14 +116,14 @@ export class labels extends MapLayer<map, LabelsEvents> {
     this.#objects = undefined;
   }
 
-  #addButton(map: map): void {
+  #addButton(map: Map3D): void {
     const button = iconButton("", getLabelsMessage(map.language), ICON);
     button.addEventListener("click", () => this.toggle());
     this.#button = addPanelButton(map, button, element("span", "map3d-status"));
   }
 
   /** Reads the names, once they are wanted. */
-  #start(map: map): void {
+  #start(map: Map3D): void {
     if (!this.#shown) return;
     const source = this.#source;
     const { objectName = nameOfObject, featureName = nameOf } = this.options;
@@ -141,7 +141,7 @@ export class labels extends MapLayer<map, LabelsEvents> {
     }
   }
 
-  #run(map: map, read: () => Promise<readonly Label[]>): void {
+  #run(map: Map3D, read: () => Promise<readonly Label[]>): void {
     read()
       .then((list) => {
         if (this.map === map) this.#add(list);
@@ -194,7 +194,7 @@ export class labels extends MapLayer<map, LabelsEvents> {
   };
 
   /** Chooses the labels to show. @param again judges places again that are known from coarser tiles */
-  #layOut(map: map, again: boolean): void {
+  #layOut(map: Map3D, again: boolean): void {
     const relief = map.relief;
     if (!relief || map.inTransition) return;
     if (map.direction !== this.#direction) for (const each of this.#placed.values()) each.place = undefined;
@@ -210,14 +210,12 @@ export class labels extends MapLayer<map, LabelsEvents> {
     const others = [...(peers.get(map) ?? [])].flatMap((peer) => (peer === this ? [] : peer.#listBoxes(map)));
     const own = near.map(({ each, at }) => boxOf(each, at));
     const chosen = chooseLabels([...others, ...own]).slice(others.length);
-    near.forEach(({ each }, k) => {
-      this.#show(each, chosen[k] === true);
-    });
+    near.forEach(({ each }, k) => this.#show(each, chosen[k] === true));
     this.#move();
   }
 
   /** Lists the boxes of the labels that are visible: they stay. */
-  #listBoxes(map: map): LabelBox[] {
+  #listBoxes(map: Map3D): LabelBox[] {
     const visible = [...this.#placed.values()].filter(({ shown }) => shown && this.#shown);
     return visible.flatMap((each) => {
       const at = each.place && map.project(each.place);
@@ -226,7 +224,7 @@ export class labels extends MapLayer<map, LabelsEvents> {
   }
 
   /** Returns where a place is on the screen; null if it is far outside. */
-  #findOnScreen(map: map, [x, y, z]: Vec3): Vec2 | null {
+  #findOnScreen(map: Map3D, [x, y, z]: Vec3): Vec2 | null {
     const at = map.project(Number.isNaN(z) ? { xy: [x, y] } : [x, y, z]);
     const { clientWidth, clientHeight } = map.container;
     return at && at[0] > -MARGIN_PX && at[1] > -MARGIN_PX && at[0] < clientWidth + MARGIN_PX && at[1] < clientHeight + MARGIN_PX

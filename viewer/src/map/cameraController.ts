@@ -27,9 +27,7 @@ const ROTATION_STEP_RAD = (28 * Math.PI) / 180;
 export abstract class CameraController extends Evented<MapEvents> {
   abstract readonly options: FilledOptions;
   protected readonly motion = new Motion(
-    () => {
-      this.requestFrame();
-    },
+    () => this.requestFrame(),
     (camera) => this.#limit(camera),
   );
   protected camera: Camera | undefined;
@@ -122,9 +120,10 @@ export abstract class CameraController extends Evented<MapEvents> {
   fitBounds(bounds: Bounds, { padding_px = 24, duration_ms = 0, maxZoom = Infinity }: FitOptions = {}): this {
     checkBounds(bounds, "fitBounds");
     for (const number of [padding_px, maxZoom]) checkNumber(number, "fitBounds");
-    return this.whenReady(() => {
-      this.#switchView();
-    }).#moveTo((camera, rendering) => fitCamera(camera, localBox(bounds, rendering), padding_px, maxZoom), duration_ms);
+    return this.whenReady(() => this.#switchView()).#moveTo(
+      (camera, rendering) => fitCamera(camera, localBox(bounds, rendering), padding_px, maxZoom),
+      duration_ms,
+    );
   }
 
   /** Sets the box that the map's centre stays in, by two opposite corners; null: the content's. */
@@ -379,14 +378,8 @@ export abstract class CameraController extends Evented<MapEvents> {
     this.#limits = { box: json.box, bounds: json.box, minZoom, maxZoom };
     this.setCamera(makeFirstCamera(rendering, view, this.size, this.options));
     this.#unsized = this.size.width * this.size.height > 0 ? undefined : this.camera;
-    if (maxBounds)
-      this.#pending.unshift(() => {
-        this.setMaxBounds(maxBounds);
-      });
-    if (center && !isVector(center))
-      this.#pending.unshift(() => {
-        this.setView(center, zoom);
-      });
+    if (maxBounds) this.#pending.unshift(() => this.setMaxBounds(maxBounds));
+    if (center && !isVector(center)) this.#pending.unshift(() => this.setView(center, zoom));
     for (const action of this.#pending.splice(0)) this.#runPending(action);
     this.fire("ready", {});
     this.fire("directionchange", { direction: this.direction });
@@ -430,17 +423,16 @@ export abstract class CameraController extends Evented<MapEvents> {
     checkPosition(position, "setView");
     checkNumber(zoom, "zoom");
     if (isVector(position))
-      return this.whenReady(() => {
-        this.#switchView();
-      }).#moveTo((camera, rendering) => centerCamera(camera, rendering, position, zoom), duration_ms);
+      return this.whenReady(() => this.#switchView()).#moveTo(
+        (camera, rendering) => centerCamera(camera, rendering, position, zoom),
+        duration_ms,
+      );
     const move = ++this.#moves;
     this.findPosition(position)
       .then((found) => {
         if (move === this.#moves) this.#centerOn(found, zoom, duration_ms);
       })
-      .catch((reason: unknown) => {
-        this.report(asError(reason));
-      });
+      .catch((reason: unknown) => this.report(asError(reason)));
     return this;
   }
 

@@ -4,7 +4,7 @@ import { add, sub, type Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
 import type { Rendering } from "../geo/manifest";
 import { worldPosition } from "../geo/position";
-import type { imageLayer } from "./imageLayer";
+import type { ImageLayer } from "./imageLayer";
 import type { ViewState } from "./layerContext";
 import { Relief } from "./relief";
 
@@ -19,7 +19,7 @@ const MAX_STEP = 8;
  */
 export async function findPosition(
   position: AnyPosition,
-  layers: readonly imageLayer[],
+  layers: readonly ImageLayer[],
   viewState: ViewState,
   rendering: Rendering,
 ): Promise<Vec3> {
@@ -36,7 +36,7 @@ export async function findPosition(
 }
 
 /** Returns the local height of the highest surface at x and y that a view shows, to a pixel; null where that is hidden or missing. */
-async function findSurface(layers: readonly imageLayer[], view: ViewState, [x, y]: Vec3): Promise<number | null> {
+async function findSurface(layers: readonly ImageLayer[], view: ViewState, [x, y]: Vec3): Promise<number | null> {
   const { axes } = view.camera.frame;
   const [lowest, highest] = new Relief(layers, view).heights;
   const [low, high] = [uvdFromLocal(axes, [x, y, lowest]), uvdFromLocal(axes, [x, y, highest])];
@@ -72,7 +72,7 @@ export function findHeight(relief: Relief, x: number, y: number): number | null 
 }
 
 /** @throws UsageError when no layer has the object */
-async function findTop(layers: readonly imageLayer[], wanted: number | string): Promise<Vec3> {
+async function findTop(layers: readonly ImageLayer[], wanted: number | string): Promise<Vec3> {
   for (const layer of layers) {
     const [id] = typeof wanted === "number" ? [wanted] : await layer.findByName(wanted);
     const box = (await layer.object(id ?? 0))?.box;

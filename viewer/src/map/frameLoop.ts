@@ -13,13 +13,8 @@ export class FrameLoop {
 
   /** Requests a frame. @param soon does not wait for a browser that is slow to draw, as while a page loads */
   request(soon = false): void {
-    this.#handle ||= requestAnimationFrame((now) => {
-      this.#run(now);
-    });
-    if (soon && this.#handle > 0)
-      this.#timer ??= setTimeout(() => {
-        this.#run(performance.now());
-      }, SOON_MS);
+    this.#handle ||= requestAnimationFrame((now) => this.#run(now));
+    if (soon && this.#handle > 0) this.#timer ??= setTimeout(() => this.#run(performance.now()), SOON_MS);
   }
 
   get pending(): boolean {

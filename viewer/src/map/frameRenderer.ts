@@ -9,7 +9,7 @@ import { Decoder } from "../tiles/decoder";
 import { RequestQueue, type TileRequest } from "../tiles/queue";
 import type { TileResources, CachedTile } from "../tiles/layerTiles";
 import { findCombinedLayers } from "./depthGroups";
-import type { imageLayer } from "./imageLayer";
+import type { ImageLayer } from "./imageLayer";
 import { computeSceneDepthRange, type LayerPlan } from "./layerPlan";
 import type { FilledOptions } from "./options";
 import type { ViewState } from "./layerContext";
@@ -41,7 +41,7 @@ export interface FrameResult {
 
 /** What is shown, wherever the camera is. */
 export interface PlanInput {
-  readonly layers: readonly imageLayer[];
+  readonly layers: readonly ImageLayer[];
   readonly light: Readonly<Light>;
   /** Kinds of tiles to fetch in addition to those shown. */
   readonly requiredKinds: readonly LayerKind[];
@@ -117,7 +117,7 @@ export class FrameRenderer {
     const combined = findCombinedLayers(layers, this.#showsCustomLayers);
     const planned = this.#plan(viewState, input);
     const next = input.next && this.plan(input.next, input);
-    const before = (layer: imageLayer): number | null => (combined.includes(layer) ? combined.indexOf(layer) : null);
+    const before = (layer: ImageLayer): number | null => (combined.includes(layer) ? combined.indexOf(layer) : null);
     const plans = planned.map(({ plan }) => plan);
     this.#queue.setRequests(listRequests([...(next ?? []), ...plans]), listRequests(input.ahead.flatMap((each) => this.plan(each, input))));
     const complete = !layers.some((layer) => layer.isLoading) && planned.every(({ plan }) => plan.complete);
@@ -155,7 +155,7 @@ export class FrameRenderer {
     return this.#plan(viewState, input).map(({ plan }) => plan);
   }
 
-  #plan(viewState: ViewState, { layers, light, requiredKinds }: PlanInput): { layer: imageLayer; plan: LayerPlan }[] {
+  #plan(viewState: ViewState, { layers, light, requiredKinds }: PlanInput): { layer: ImageLayer; plan: LayerPlan }[] {
     const combined = findCombinedLayers(layers, this.#showsCustomLayers);
     return layers.flatMap((layer) => {
       const plan = layer.plan(viewState, light, requiredKinds, combined.includes(layer));
@@ -208,18 +208,10 @@ export class FrameRenderer {
   #createDrawer(kind: FilledOptions["drawer"]): Drawer {
     const { canvas } = this.#viewport;
     const events: DrawerEvents = {
-      lost: () => {
-        this.#onContextLost();
-      },
-      restored: () => {
-        this.#onContextRestored();
-      },
-      changed: () => {
-        this.#events.changed();
-      },
-      failed: (error) => {
-        this.#events.failed(error);
-      },
+      lost: () => this.#onContextLost(),
+      restored: () => this.#onContextRestored(),
+      changed: () => this.#events.changed(),
+      failed: (error) => this.#events.failed(error),
     };
     const preserve = this.#options.preserveDrawingBuffer;
     if (kind === "canvas") return new CanvasDrawer(canvas, preserve, events);
@@ -234,10 +226,7 @@ export class FrameRenderer {
   }
 
   #onContextLost(): void {
-    if (this.#options.drawer === "auto")
-      this.#restoreTimer ??= setTimeout(() => {
-        this.#switchToCanvas();
-      }, RESTORE_MS);
+    if (this.#options.drawer === "auto") this.#restoreTimer ??= setTimeout(() => this.#switchToCanvas(), RESTORE_MS);
     this.#events.lost();
   }
 

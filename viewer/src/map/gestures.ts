@@ -55,55 +55,13 @@ export class Gestures {
     this.#map = map;
     this.#canvas = canvas;
     const { signal } = this.#listeners;
-    canvas.addEventListener(
-      "pointerdown",
-      (event) => {
-        this.#down(event);
-      },
-      { signal },
-    );
-    canvas.addEventListener(
-      "pointermove",
-      (event) => {
-        this.#move(event);
-      },
-      { signal },
-    );
-    canvas.addEventListener(
-      "pointerup",
-      (event) => {
-        this.#up(event, true);
-      },
-      { signal },
-    );
-    canvas.addEventListener(
-      "pointercancel",
-      (event) => {
-        this.#up(event, false);
-      },
-      { signal },
-    );
-    canvas.addEventListener(
-      "pointerleave",
-      () => {
-        this.#map.hover(null);
-      },
-      { signal },
-    );
-    canvas.addEventListener(
-      "contextmenu",
-      (event) => {
-        event.preventDefault();
-      },
-      { signal },
-    );
-    canvas.addEventListener(
-      "wheel",
-      (event) => {
-        this.#wheel(event);
-      },
-      { signal, passive: false },
-    );
+    canvas.addEventListener("pointerdown", (event) => this.#down(event), { signal });
+    canvas.addEventListener("pointermove", (event) => this.#move(event), { signal });
+    canvas.addEventListener("pointerup", (event) => this.#up(event, true), { signal });
+    canvas.addEventListener("pointercancel", (event) => this.#up(event, false), { signal });
+    canvas.addEventListener("pointerleave", () => this.#map.hover(null), { signal });
+    canvas.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
+    canvas.addEventListener("wheel", (event) => this.#wheel(event), { signal, passive: false });
   }
 
   destroy(): void {

@@ -1,6 +1,7 @@
-import { checkNumber, checkOptions } from "../core/check";
+import { checkNumber } from "../core/check";
 import { getFeature } from "../core/features";
 import { MapLayer } from "../core/mapLayer";
+import { fillOptions, option, optionOr, type FilledOptionsOf, type OptionsOf } from "../core/options";
 import { asError, UsageError } from "../core/errors";
 import type { Vec2 } from "../core/vec";
 import { parseColor, type Rgb } from "../draw/color";
@@ -26,21 +27,23 @@ import type { ClickEvent, HoverEvent, TooltipContent } from "./options";
 const MOST_NAMESAKES = 32;
 const HOVER_EVENTS = ["mouseover", "mouseout", "mousemove"] as const;
 
-type BindTooltip = (layer: imageLayer, content: TooltipContent, getPane: () => HTMLElement | undefined) => () => void;
+type BindTooltip = (layer: ImageLayer, content: TooltipContent, getPane: () => HTMLElement | undefined) => () => void;
+
+const LAYER_OPTIONS = {
+  /** One of lit | color | picture | normal | id | depth. Default "lit". */
+  mode: optionOr<Mode>("lit"),
+  /** Opacity, 0 to 1. Default 1. */
+  opacity: optionOr<number>(1, checkNumber),
+  /** Default colour of highlights. Default "#19b5e0". */
+  highlightColor: optionOr<string>("#19b5e0"),
+  /** Attribution text. Default: the manifest's. */
+  attribution: option<string>(),
+  /** Combines the layer with others by depth, so that the nearest surface is visible. false: draws it over earlier layers. Default true. */
+  combine: optionOr<boolean>(true),
+};
 
 /** Options of an image layer. */
-export interface ImageLayerOptions {
-  /** One of lit | color | picture | normal | id | depth. Default "lit". */
-  mode?: Mode;
-  /** Opacity, 0 to 1. Default 1. */
-  opacity?: number;
-  /** Default colour of highlights. Default "#19b5e0". */
-  highlightColor?: string;
-  /** Attribution text. Default: the manifest's. */
-  attribution?: string;
-  /** Combines the layer with others by depth, so that the nearest surface is visible. false: draws it over earlier layers. Default true. */
-  combine?: boolean;
-}
+export interface ImageLayerOptions extends OptionsOf<typeof LAYER_OPTIONS> {}
 
 /** Events of an image layer. */
 export interface ImageLayerEvents {
@@ -59,8 +62,8 @@ export interface ImageLayerEvents {
 }
 
 /** A rendering on the map, from base URLs or another source. Several base URLs are hosts with the same tiles; requests are spread over them by tile. */
-export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
-  readonly options: Required<Omit<ImageLayerOptions, "attribution">> & Pick<ImageLayerOptions, "attribution">;
+export class ImageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
+  readonly options: FilledOptionsOf<typeof LAYER_OPTIONS>;
   /** Its source. */
   readonly source: Source;
   #mode: Mode;
@@ -84,16 +87,14 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   /** @param urls base URLs, or another source  @throws UsageError without a URL, or for an unknown option or mode */
   constructor(urls: string | readonly string[] | Source, options: ImageLayerOptions = {}) {
     super();
-    checkOptions(options, ["mode", "opacity", "highlightColor", "attribution", "combine"]);
-    checkNumber(options.opacity, "opacity");
-    this.options = { mode: "lit", opacity: 1, highlightColor: "#19b5e0", combine: true, ...options };
+    this.options = fillOptions(LAYER_OPTIONS, options);
     this.#mode = checkMode(this.options.mode);
     this.source = typeof urls === "object" && "tile" in ((urls as object | null) ?? {}) ? (urls as Source) : new HttpSource(urls as string);
   }
 
   /** @internal Makes a layer of the same rendering with the same styles, for another map. */
-  copy(): imageLayer {
-    const copy = new imageLayer(this.source, { ...this.options, mode: this.#mode });
+  copy(): ImageLayer {
+    const copy = new ImageLayer(this.source, { ...this.options, mode: this.#mode });
     copy.#style = this.#style;
     copy.#descendants = new Map(this.#descendants);
     return copy.#setColors(this.#colors);
@@ -270,9 +271,7 @@ export class imageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
       .then((rendering) => {
         if (this.#context === context) this.#start(rendering, context);
       })
-      .catch((reason: unknown) => {
-        failed(asError(reason));
-      });
+      .catch((reason: unknown) => failed(asError(reason)));
   }
 
   protected onRemove(): void {

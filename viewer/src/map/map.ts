@@ -1,4 +1,3 @@
-import { checkNumber, checkOptions } from "../core/check";
 import { adoptStyles, element } from "../core/dom";
 import { asError } from "../core/errors";
 import { Evented } from "../core/events";
@@ -12,17 +11,17 @@ import type { Camera } from "../geo/camera";
 import type { Light } from "../geo/light";
 import type { LightEstimator } from "../draw/lightEstimator";
 import type { Rendering } from "../geo/manifest";
-import type { marker } from "../overlay/marker";
+import type { Marker } from "../overlay/marker";
 import { STYLES } from "../ui/styles";
 import { FrameLoop } from "./frameLoop";
 import { Gestures, type GestureTarget } from "./gestures";
-import type { imageLayer } from "./imageLayer";
+import type { ImageLayer } from "./imageLayer";
 import { findAllVisibleObjects, type VisibleObject } from "./visibleObjects";
 import { listenToKeys } from "./keyboard";
 import type { LayerPlan } from "./layerPlan";
 import { MapItems } from "./mapItems";
 import { MapLight, checkTime } from "./mapLight";
-import { DEFAULTS, OPTIONS, savesData, type FilledOptions, type MapOptions } from "./options";
+import { fillMapOptions, type FilledOptions, type MapOptions } from "./options";
 import { FrameRenderer, type PlanInput } from "./frameRenderer";
 import { EMPTY_PICK, pick, pickLoaded, type Pick } from "./picker";
 import { PointerEvents } from "./pointerEvents";
@@ -31,21 +30,18 @@ import { findPosition } from "./findPosition";
 import type { ViewState, LayerContext } from "./layerContext";
 import { addControls } from "./addControls";
 import { CameraController } from "./cameraController";
-import { checkBounds } from "./cameras";
 import { Viewport, type Size } from "./viewport";
 import type { Rect } from "../tiles/cover";
 
 /** A map in a canvas of the page. World coordinates are those of the scene's CRS, in metres. */
-export class map extends CameraController implements OverlayHost, LayerHost<map>, GestureTarget {
+export class Map3D extends CameraController implements OverlayHost, LayerHost<Map3D>, GestureTarget {
   readonly options: FilledOptions;
   /** Events after which markers and popups update their positions. */
   readonly frameEvents = new Evented<OverlayEvents>();
   readonly #viewport: Viewport;
   readonly #renderer: FrameRenderer | null;
-  readonly #loop = new FrameLoop((now) => {
-    this.#frame(now);
-  });
-  readonly #items = new MapItems<map>((selected) => this.fire("select", { marker: selected }));
+  readonly #loop = new FrameLoop((now) => this.#frame(now));
+  readonly #items = new MapItems<Map3D>((selected) => this.fire("select", { marker: selected }));
   readonly #light: MapLight;
   readonly #pointer = new PointerEvents(this);
   readonly #abort = new AbortController();
@@ -70,29 +66,11 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   /** @param target the id of a canvas, or an element  @throws UsageError when there is none, when it has a map already, and for unknown or wrong options */
   constructor(target: string | HTMLElement, options: MapOptions = {}) {
     super();
-    checkOptions(options, OPTIONS);
-    if (options.center) checkPosition(options.center, "center");
-    if (options.maxBounds) checkBounds(options.maxBounds, "maxBounds");
-    for (const name of [
-      "zoom",
-      "minZoom",
-      "maxZoom",
-      "pixelRatio",
-      "maxPixelRatio",
-      "maxTileRatio",
-      "cacheBytes",
-      "concurrency",
-      "workers",
-    ] as const)
-      checkNumber(options[name], name);
-    const { dataSaver = DEFAULTS.dataSaver } = options;
-    this.options = { ...DEFAULTS, ...options, dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
+    this.options = fillMapOptions(options);
     const withoutShadows = this.options.dataSaver ? { shadows: false, occlusion: false } : {};
     this.#light = new MapLight({ ...withoutShadows, ...options.light });
     adoptStyles(document, STYLES);
-    this.#viewport = new Viewport(target, () => {
-      this.#onResize();
-    });
+    this.#viewport = new Viewport(target, () => this.#onResize());
     if (options.background !== undefined) this.setBackground(options.background);
     this.#renderer = this.#createRenderer();
     this.#addListeners();
@@ -102,26 +80,26 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   // Layers, markers and popups
 
   /** Adds a layer, marker or popup. */
-  add(item: Addable<map>): this {
+  add(item: Addable<Map3D>): this {
     if (!this.#items.add(item)) return this;
     item.attachTo(this);
     return this.#redraw();
   }
 
   /** Removes a layer, marker or popup. */
-  discard(item: Addable<map>): this {
+  discard(item: Addable<Map3D>): this {
     if (!this.#items.delete(item)) return this;
     item.detachFrom(this);
     return this.#redraw();
   }
 
   /** The same as `add`. */
-  addLayer(item: Addable<map>): this {
+  addLayer(item: Addable<Map3D>): this {
     return this.add(item);
   }
 
   /** The same as `discard`. */
-  removeLayer(item: Addable<map>): this {
+  removeLayer(item: Addable<Map3D>): this {
     return this.discard(item);
   }
 
@@ -137,7 +115,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   /** The map's image layers, lowest first. */
-  get layers(): readonly imageLayer[] {
+  get layers(): readonly ImageLayer[] {
     return this.#items.layers;
   }
 
@@ -147,7 +125,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   /** @internal */
-  get markers(): readonly marker[] {
+  get markers(): readonly Marker[] {
     return this.#items.markers;
   }
 
@@ -246,7 +224,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   /** Lists the visible objects of all layers, topmost layer first and the largest of each layer first. Ignores occlusion between layers. @param hidden includes objects that styles hide */
-  async objectsInView(hidden = false): Promise<readonly (VisibleObject & { readonly layer: imageLayer })[]> {
+  async objectsInView(hidden = false): Promise<readonly (VisibleObject & { readonly layer: ImageLayer })[]> {
     const viewState = this.getViewState();
     return viewState ? findAllVisibleObjects(this.layers, viewState, hidden) : [];
   }
@@ -265,9 +243,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   async findPosition(position: AnyPosition): Promise<Vec3> {
     checkPosition(position, "findPosition");
     const rendering = await new Promise<Rendering>((ready, fail) => {
-      this.whenReady((_, found) => {
-        ready(found);
-      }).#items.onLoadError(fail);
+      this.whenReady((_, found) => ready(found)).#items.onLoadError(fail);
     });
     return findPosition(position, this.layers, this.getViewState() as ViewState, rendering);
   }
@@ -335,19 +311,13 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
           dropTiles: (layer) => {
             renderer.dropTiles(`${layer}/`);
           },
-          checkCompatible: (rendering) => {
-            this.checkCompatible(rendering);
-          },
+          checkCompatible: (rendering) => this.checkCompatible(rendering),
           onManifest: (rendering) => {
             if (!this.camera) this.initializeView(rendering);
             this.#redraw();
           },
-          requestFrame: () => {
-            this.#redraw();
-          },
-          report: (error) => {
-            this.report(error);
-          },
+          requestFrame: () => this.#redraw(),
+          report: (error) => this.report(error),
         };
   }
 
@@ -420,7 +390,7 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   }
 
   get #planInput(): PlanInput {
-    return { layers: this.layers, light: this.light, requiredKinds: this.#findRequiredKinds() };
+    return { layers: this.layers, light: this.light, requiredKinds: this.#items.listNeeds(this.options.hover && !this.options.dataSaver) };
   }
 
   protected isCovered(camera: Camera): boolean {
@@ -429,11 +399,6 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
       viewState !== null &&
       this.#renderer?.plan({ ...viewState, camera }, this.#planInput).every(({ uncovered }) => uncovered === 0) === true
     );
-  }
-
-  /** Lists kinds of tiles that are read, in addition to those shown. */
-  #findRequiredKinds(): PlanInput["requiredKinds"] {
-    return [...new Set([...(this.options.hover && !this.options.dataSaver ? ["id" as const] : []), ...this.#items.needs])];
   }
 
   #fireMove(lastCamera: Camera | undefined, { zoom }: Camera): void {
@@ -492,16 +457,12 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
           this.fire("contextrestored", {}).#redraw();
         },
         changed: () => this.#redraw(),
-        failed: (error) => {
-          this.report(error);
-        },
+        failed: (error) => this.report(error),
       });
     } catch (reason) {
       const error = asError(reason);
       this.container.append(element("p", "map3d-message", { role: "alert" }, error.message));
-      queueMicrotask(() => {
-        this.report(error);
-      });
+      queueMicrotask(() => this.report(error));
       return null;
     }
   }
@@ -509,14 +470,13 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   #addListeners(): void {
     const { signal } = this.#abort;
     this.#listenToGestures();
-    signal.addEventListener("abort", () => {
-      this.#gestures?.destroy();
-    });
+    signal.addEventListener("abort", () => this.#gestures?.destroy());
     listenToKeys(this, signal);
     window.addEventListener(
       "online",
       () => {
-        this.#retryFailedTiles();
+        for (const layer of this.layers) layer.tiles?.clearFailures();
+        this.#redraw();
       },
       { signal },
     );
@@ -526,10 +486,5 @@ export class map extends CameraController implements OverlayHost, LayerHost<map>
   #listenToGestures(): void {
     this.#gestures?.destroy();
     this.#gestures = new Gestures(this, this.canvas);
-  }
-
-  #retryFailedTiles(): void {
-    for (const layer of this.layers) layer.tiles?.clearFailures();
-    this.#redraw();
   }
 }

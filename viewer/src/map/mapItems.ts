@@ -1,18 +1,18 @@
 import type { Addable } from "../core/mapLayer";
 import type { LayerKind } from "../tiles/tileData";
-import { marker } from "../overlay/marker";
-import { imageLayer } from "./imageLayer";
+import { Marker } from "../overlay/marker";
+import { ImageLayer } from "./imageLayer";
 
 /** What is on a map: image layers, markers, popups and others. */
 export class MapItems<M> {
   /** Image layers, lowest first. */
-  layers: readonly imageLayer[] = [];
+  layers: readonly ImageLayer[] = [];
   readonly #all = new Set<Addable<M>>();
   #onLoadError: ((error: Error) => void)[] = [];
-  readonly #onSelect: (selected: marker) => void;
+  readonly #onSelect: (selected: Marker) => void;
 
   /** @param onSelect called when a marker is selected; the others are deselected */
-  constructor(onSelect: (selected: marker) => void) {
+  constructor(onSelect: (selected: Marker) => void) {
     this.#onSelect = onSelect;
   }
 
@@ -20,8 +20,8 @@ export class MapItems<M> {
     return [...this.#all];
   }
 
-  get markers(): readonly marker[] {
-    return this.all.filter((item) => item instanceof marker);
+  get markers(): readonly Marker[] {
+    return this.all.filter((item) => item instanceof Marker);
   }
 
   /** Calls functions, once, as soon as no rendering could be loaded, and tells them why. */
@@ -36,17 +36,17 @@ export class MapItems<M> {
     return [...new Set(this.layers.map(({ attribution }) => attribution).filter((text) => text !== ""))];
   }
 
-  /** Kinds of tiles that the items read, in addition to those shown. */
-  get needs(): readonly LayerKind[] {
-    return this.all.flatMap(({ needs }) => needs ?? []);
+  /** Lists kinds of tiles that are read, in addition to those shown: by the items, and ids with `ids`. */
+  listNeeds(ids: boolean): readonly LayerKind[] {
+    return [...new Set([...(ids ? (["id"] as const) : []), ...this.all.flatMap(({ needs }) => needs ?? [])])];
   }
 
   /** @returns false when the item is on the map already */
   add(item: Addable<M>): boolean {
     if (this.#all.has(item)) return false;
     this.#all.add(item);
-    if (item instanceof imageLayer) this.layers = [...this.layers, item];
-    if (item instanceof marker) item.on("select", this.#select);
+    if (item instanceof ImageLayer) this.layers = [...this.layers, item];
+    if (item instanceof Marker) item.on("select", this.#select);
     return true;
   }
 
@@ -54,16 +54,16 @@ export class MapItems<M> {
   delete(item: Addable<M>): boolean {
     if (!this.#all.delete(item)) return false;
     this.layers = this.layers.filter((layer) => layer !== item);
-    if (item instanceof marker) item.off("select", this.#select);
+    if (item instanceof Marker) item.off("select", this.#select);
     return true;
   }
 
   /** Deselects all markers but one. */
-  deselectMarkers(except?: marker): void {
+  deselectMarkers(except?: Marker): void {
     for (const each of this.markers) if (each !== except) each.select(false);
   }
 
-  readonly #select = ({ marker: selected }: { marker: marker }): void => {
+  readonly #select = ({ marker: selected }: { marker: Marker }): void => {
     this.deselectMarkers(selected);
     this.#onSelect(selected);
   };

@@ -1,112 +1,84 @@
+import { checkNumber } from "../core/check";
 import type { Light } from "../geo/light";
 import type { Corner } from "../core/corner";
-import type { AnyPosition } from "../core/position";
-import type { Bounds } from "./cameras";
+import { fillOptions, option, optionOr, type FilledOptionsOf, type OptionsOf } from "../core/options";
+import { checkPosition, type AnyPosition } from "../core/position";
+import { checkBounds, type Bounds } from "./cameras";
 import type { Pick } from "./picker";
 import type { Attribute, ObjectInfo } from "../tiles/objects";
-import type { marker } from "../overlay/marker";
+import type { Marker } from "../overlay/marker";
 
-/** Options of a map. */
-export interface MapOptions {
-  /** Initial centre. Default: the rendering's start. */
-  center?: AnyPosition;
-  /** Initial zoom. Default: fits everything, or see `cover`. */
-  zoom?: number;
-  /** Lowest zoom. Default: 1.2 levels below the one that shows everything. */
-  minZoom?: number;
-  /** Highest zoom. Default: two levels beyond the deepest one, where a tile pixel is four CSS pixels wide. */
-  maxZoom?: number;
-  /** Box that the map's centre stays in, by two opposite corners. A drag goes a quarter of the screen beyond, with growing resistance, and springs back. Default: the scene's content. */
-  maxBounds?: Bounds;
-  /** A drag with Shift zooms to a rectangle. Default true. */
-  boxZoom?: boolean;
-  /** Without a zoom, enlarges a landscape at first until it fills the map; objects that are high for their width stay whole. Default false; the ready-made page and `<map-3d>` do it. */
-  cover?: boolean;
-  /** Id of the initial view, such as "45-22.5". Default: the manifest's first view. */
-  direction?: string;
-  /** Light at first; the parts that are left out are those of `DEFAULT_LIGHT`. Default: `{ lit: true, azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.76, sun_rgb: [1, 1, 1], sky_rgb: [1, 1, 1], shadows: true, occlusion: true }`, from the south-west. */
-  light?: Partial<Light>;
-  /** CSS background behind the model. Default: the style sheet's, light or dark. */
-  background?: string;
+/** Makes a check that accepts undefined and null. */
+const ifGiven =
+  <T>(check: (value: T, name: string) => unknown) =>
+  (value: T, name: string): unknown =>
+    value && check(value, name);
+
+/** The options of a map. */
+export const MAP_OPTIONS = {
   /** Shows buttons and compass: true, at the lower right, or a corner (needs the entry `controls`). Default true. */
-  controls?: boolean | Corner;
+  controls: optionOr<boolean | Corner>(true),
+  /** Initial centre. Default: the rendering's start. */
+  center: option<AnyPosition>(ifGiven(checkPosition)),
+  /** Initial zoom. Default: fits everything, or see `cover`. */
+  zoom: option<number>(checkNumber),
+  /** Lowest zoom. Default: 1.2 levels below the one that shows everything. */
+  minZoom: option<number>(checkNumber),
+  /** Highest zoom. Default: two levels beyond the deepest one, where a tile pixel is four CSS pixels wide. */
+  maxZoom: option<number>(checkNumber),
+  /** Box that the map's centre stays in, by two opposite corners. A drag goes a quarter of the screen beyond, with growing resistance, and springs back. Default: the scene's content. */
+  maxBounds: option<Bounds>(ifGiven(checkBounds)),
+  /** A drag with Shift zooms to a rectangle. Default true. */
+  boxZoom: optionOr<boolean>(true),
+  /** Without a zoom, enlarges a landscape at first until it fills the map; objects that are high for their width stay whole. Default false; the ready-made page and `<map-3d>` do it. */
+  cover: optionOr<boolean>(false),
+  /** Id of the initial view, such as "45-22.5". Default: the manifest's first view. */
+  direction: option<string>(),
+  /** Light at first; the parts that are left out are those of `DEFAULT_LIGHT`. Default: `{ lit: true, azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.76, sun_rgb: [1, 1, 1], sky_rgb: [1, 1, 1], shadows: true, occlusion: true }`, from the south-west. */
+  light: option<Partial<Light>>(),
+  /** CSS background behind the model. Default: the style sheet's, light or dark. */
+  background: option<string>(),
   /** Shows the scale bar: true, at the lower left, or a corner. Default: true if there are buttons. */
-  scaleBar?: boolean | Corner;
+  scaleBar: option<boolean | Corner>(),
   /** Shows the attribution: true, along the lower edge, or a corner. Default true. */
-  attribution?: boolean | Corner;
+  attribution: optionOr<boolean | Corner>(true),
   /** Fetches the ids of everything in view, so that "mousemove" reports the object under the pointer. Default false. */
-  hover?: boolean;
+  hover: optionOr<boolean>(false),
   /** Size of the cache of decoded tiles. Tiles in view are always kept. Default: 60 bytes per device pixel of the map, 45 on dense screens, whose tiles have fewer pixels, and less as `maxTileRatio` and `dataSaver` make tiles coarser; at least 24 MB. */
-  cacheBytes?: number;
+  cacheBytes: option<number>(checkNumber),
   /** Maximum number of concurrent tile requests. Default 12. */
-  concurrency?: number;
+  concurrency: optionOr<number>(12, checkNumber),
   /** Number of decoding threads. Default 2. */
-  workers?: number;
+  workers: optionOr<number>(2, checkNumber),
   /** Upper limit of device pixels per CSS pixel. Default 2, as many as tiles have (`maxTileRatio`): on denser screens, the browser enlarges the picture, which spares more than half of the work and memory for pixels. */
-  maxPixelRatio?: number;
+  maxPixelRatio: optionOr<number>(2, checkNumber),
   /** Upper limit of tile pixels per CSS pixel: finer tiles cost bytes that few can see. Default 2, so that a tile pixel covers half a CSS pixel to a whole one on screens of any density from 2 on. */
-  maxTileRatio?: number;
+  maxTileRatio: optionOr<number>(2, checkNumber),
   /** Device pixels per CSS pixel. Default: those of the screen, up to `maxPixelRatio`. */
-  pixelRatio?: number;
+  pixelRatio: option<number>(checkNumber),
   /** Saves data: tiles one level coarser on dense screens, no ids for hovering, no tiles of the neighbouring directions while the map is at rest, shadows and occlusion only on request. "auto": if the user has enabled it in the browser. Default "auto". */
-  dataSaver?: boolean | "auto";
+  dataSaver: optionOr<boolean | "auto">("auto"),
   /** @internal Shows tiles of this many levels more. Default 0. */
-  finer?: number;
+  finer: optionOr<number>(0),
   /** Language of controls and numbers, BCP 47; English, German and French are supported. Default: that of the page around the map (its `lang`), else the browser's. */
-  language?: string;
+  language: option<string>(),
   /** "webgl" requires WebGL2; "canvas" works without it; "auto" uses WebGL2 on a GPU, else the canvas, which is much faster than WebGL without a GPU. Default "auto". */
-  drawer?: "auto" | "webgl" | "canvas";
+  drawer: optionOr<"auto" | "webgl" | "canvas">("auto"),
   /** Keeps the picture readable between frames (for screenshots and tests). Default false. */
-  preserveDrawingBuffer?: boolean;
-}
-
-/** Options without a fixed default. */
-type WithoutDefault =
-  | "center"
-  | "zoom"
-  | "minZoom"
-  | "maxZoom"
-  | "maxBounds"
-  | "scaleBar"
-  | "direction"
-  | "light"
-  | "background"
-  | "language"
-  | "pixelRatio"
-  | "cacheBytes";
-export type FilledOptions = MapOptions & Required<Omit<MapOptions, WithoutDefault | "dataSaver">> & { dataSaver: boolean };
-
-export const DEFAULTS: Required<Omit<MapOptions, WithoutDefault>> = {
-  controls: true,
-  attribution: true,
-  cover: false,
-  boxZoom: true,
-  hover: false,
-  concurrency: 12,
-  workers: 2,
-  maxPixelRatio: 2,
-  maxTileRatio: 2,
-  drawer: "auto",
-  preserveDrawingBuffer: false,
-  dataSaver: "auto",
-  finer: 0,
+  preserveDrawingBuffer: optionOr<boolean>(false),
 };
 
-export const OPTIONS: readonly string[] = [
-  ...Object.keys(DEFAULTS),
-  "center",
-  "zoom",
-  "minZoom",
-  "maxZoom",
-  "maxBounds",
-  "scaleBar",
-  "direction",
-  "light",
-  "background",
-  "language",
-  "pixelRatio",
-  "cacheBytes",
-];
+/** Options of a map. */
+export interface MapOptions extends OptionsOf<typeof MAP_OPTIONS> {}
+
+/** A map's options with their defaults; `dataSaver` is what "auto" results in. */
+export type FilledOptions = FilledOptionsOf<typeof MAP_OPTIONS> & { dataSaver: boolean };
+
+/** Returns a map's options with their defaults. @throws UsageError for unknown and wrong options */
+export function fillMapOptions(options: MapOptions): FilledOptions {
+  const { dataSaver = "auto" } = options;
+  return { ...fillOptions(MAP_OPTIONS, options), dataSaver: dataSaver === "auto" ? savesData() : dataSaver };
+}
 
 /** Options of `fitBounds`. */
 export interface FitOptions {
@@ -140,7 +112,7 @@ export const EVENTS: readonly (keyof MapEvents)[] = [
 ];
 
 /** Whether the user wants to save data (Save-Data, or prefers-reduced-data). */
-export const savesData = (): boolean =>
+const savesData = (): boolean =>
   (navigator as { connection?: { saveData?: boolean } }).connection?.saveData === true ||
   matchMedia("(prefers-reduced-data: reduce)").matches;
 
@@ -184,7 +156,7 @@ export interface MapEvents {
   /** The pointer has moved; with data in memory (see the option `hover`). */
   mousemove: HoverEvent;
   /** A marker has been selected. */
-  select: { marker: marker };
+  select: { marker: Marker };
   /** The map's size has changed, CSS pixels. */
   resize: { width: number; height: number };
   /** Something could not be fetched, read or drawn; the map continues. Without a listener, it is logged as a warning. */

@@ -6,7 +6,7 @@ import { pixelAt, uvOfPixel, type Tile } from "../geo/frame";
 import type { View } from "../geo/manifest";
 import { type LayerKind, NO_DEPTH, type TileData } from "../tiles/tileData";
 import { groupByDepth } from "./depthGroups";
-import type { imageLayer } from "./imageLayer";
+import type { ImageLayer } from "./imageLayer";
 import { DEPTH_UNIT_M, computeCenter } from "./layerPlan";
 import type { ViewState } from "./layerContext";
 
@@ -18,13 +18,13 @@ export interface Pick {
   readonly position: Vec3 | null;
   /** true: read from a tile above the deepest level, and therefore inexact. */
   readonly approximate: boolean;
-  readonly layer: imageLayer | null;
+  readonly layer: ImageLayer | null;
 }
 
 export const EMPTY_PICK: Pick = { id: 0, position: null, approximate: false, layer: null };
 
 /** Picks the object under CSS pixels, exactly; approximate where a tile cannot be fetched. */
-export async function pick(layers: readonly imageLayer[], viewState: ViewState, at: Vec2): Promise<Pick> {
+export async function pick(layers: readonly ImageLayer[], viewState: ViewState, at: Vec2): Promise<Pick> {
   try {
     return await pickExactly(layers, viewState, at);
   } catch {
@@ -34,7 +34,7 @@ export async function pick(layers: readonly imageLayer[], viewState: ViewState, 
 }
 
 /** Picks exactly, from the deepest level; fetches its tiles if necessary. */
-async function pickExactly(layers: readonly imageLayer[], viewState: ViewState, at: Vec2): Promise<Pick> {
+async function pickExactly(layers: readonly ImageLayer[], viewState: ViewState, at: Vec2): Promise<Pick> {
   for (const group of groupsAt(layers, viewState, at)) {
     const picks = await Promise.all(group.map((layer) => pickFromLayer(layer, viewState, at)));
     const pick = findNearest(picks, group, viewState);
@@ -43,7 +43,7 @@ async function pickExactly(layers: readonly imageLayer[], viewState: ViewState, 
   return EMPTY_PICK;
 }
 
-async function pickFromLayer(layer: imageLayer, viewState: ViewState, at: Vec2): Promise<Pick | null> {
+async function pickFromLayer(layer: ImageLayer, viewState: ViewState, at: Vec2): Promise<Pick | null> {
   const viewPoint = findViewPoint(layer, viewState, at);
   const pixel = viewPoint && pixelAt(viewPoint.view.frame, viewPoint.view.frame.zmax, ...viewPoint.uv);
   if (!pixel) return null;
@@ -55,7 +55,7 @@ async function pickFromLayer(layer: imageLayer, viewState: ViewState, at: Vec2):
 }
 
 /** Picks from the tiles in memory, finest first; null when none covers the point. */
-export function pickLoaded(layers: readonly imageLayer[], viewState: ViewState, at: Vec2): Pick | null {
+export function pickLoaded(layers: readonly ImageLayer[], viewState: ViewState, at: Vec2): Pick | null {
   let nothing: Pick | null = null;
   for (const group of groupsAt(layers, viewState, at)) {
     const picks = group.map((layer) => pickLoadedFromLayer(layer, viewState, at));
@@ -71,7 +71,7 @@ export function pickLoaded(layers: readonly imageLayer[], viewState: ViewState, 
 }
 
 /** Picks from a layer's finest tile in memory; a pick without a layer: nothing is there. */
-function pickLoadedFromLayer(layer: imageLayer, viewState: ViewState, at: Vec2): Pick | null {
+function pickLoadedFromLayer(layer: ImageLayer, viewState: ViewState, at: Vec2): Pick | null {
   const viewPoint = findViewPoint(layer, viewState, at);
   if (!viewPoint) return null;
   const { frame } = viewPoint.view;
@@ -91,7 +91,7 @@ function pickLoadedFromLayer(layer: imageLayer, viewState: ViewState, at: Vec2):
 }
 
 /** Groups the layers that are visible at a point, topmost first; the layers of a group hide each other by depth. */
-function groupsAt(layers: readonly imageLayer[], { camera }: ViewState, [x, y]: Vec2): (readonly imageLayer[])[] {
+function groupsAt(layers: readonly ImageLayer[], { camera }: ViewState, [x, y]: Vec2): (readonly ImageLayer[])[] {
   const point: Vec2 = [x / camera.width, y / camera.height];
   return [...groupByDepth(layers.filter((layer) => layer.showsAt(point)))].reverse();
 }
@@ -99,7 +99,7 @@ function groupsAt(layers: readonly imageLayer[], { camera }: ViewState, [x, y]: 
 /** Finds the pick of a group that the drawers show. */
 function findNearest(
   picks: readonly (Pick | null)[],
-  group: readonly imageLayer[],
+  group: readonly ImageLayer[],
   { camera: { frame, zoom }, origin }: ViewState,
 ): Pick | null {
   const depth = (pick: Pick, k: number): number =>
@@ -113,7 +113,7 @@ interface ViewPoint {
   readonly uv: Vec2;
 }
 
-function findViewPoint(layer: imageLayer, viewState: ViewState, [x, y]: Vec2): ViewPoint | null {
+function findViewPoint(layer: ImageLayer, viewState: ViewState, [x, y]: Vec2): ViewPoint | null {
   const { camera } = viewState;
   const view = layer.findView(camera.frame);
   if (!view || !layer.rendering) return null;
@@ -122,12 +122,12 @@ function findViewPoint(layer: imageLayer, viewState: ViewState, [x, y]: Vec2): V
   return { view, uv: [u + (x - camera.width / 2) * px, v - (y - camera.height / 2) * px] };
 }
 
-async function fetchTile(layer: imageLayer, view: View, kind: LayerKind, tile: Tile): Promise<TileData | null> {
+async function fetchTile(layer: ImageLayer, view: View, kind: LayerKind, tile: Tile): Promise<TileData | null> {
   const info = layer.rendering?.layers.get(kind);
   return info && layer.tiles ? layer.tiles.fetch(view, info, tile) : null;
 }
 
-function findLoadedTile(layer: imageLayer, view: View, kind: LayerKind, tile: Tile): TileData | null {
+function findLoadedTile(layer: ImageLayer, view: View, kind: LayerKind, tile: Tile): TileData | null {
   const info = layer.rendering?.layers.get(kind);
   return (info && layer.tiles?.get(view, info, tile)?.data) ?? null;
 }
@@ -139,7 +139,7 @@ interface TilePixel {
 }
 
 /** Reads a pick from tile data; null when nothing is there. */
-function readPick(layer: imageLayer, view: View, pixel: TilePixel, ids: TileData | null, depths: TileData | null): Pick | null {
+function readPick(layer: ImageLayer, view: View, pixel: TilePixel, ids: TileData | null, depths: TileData | null): Pick | null {
   const id = readValue(ids, pixel);
   const depth = readValue(depths, pixel) ?? NO_DEPTH;
   if ((!id && depth === NO_DEPTH) || layer.isHidden(id ?? 0)) return null;
@@ -151,7 +151,7 @@ function readValue(data: TileData | null, { i, j }: TilePixel): number | undefin
 }
 
 /** Computes the world coordinates of a pixel's centre. */
-function computePosition(layer: imageLayer, { frame }: View, { tile, i, j }: TilePixel, depth: number): Vec3 | null {
+function computePosition(layer: ImageLayer, { frame }: View, { tile, i, j }: TilePixel, depth: number): Vec3 | null {
   const rendering = layer.rendering;
   if (!rendering || depth === NO_DEPTH) return null;
   const unit = rendering.layers.get("depth")?.unit_m ?? DEPTH_UNIT_M;

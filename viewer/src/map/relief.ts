@@ -6,7 +6,7 @@ import type { Rendering, View } from "../geo/manifest";
 import { findCover, computeLevel, type Rect } from "../tiles/cover";
 import type { LayerTiles } from "../tiles/layerTiles";
 import { NO_DEPTH } from "../tiles/tileData";
-import type { imageLayer } from "./imageLayer";
+import type { ImageLayer } from "./imageLayer";
 import { DEPTH_UNIT_M } from "./layerPlan";
 import type { ViewState } from "./layerContext";
 
@@ -32,7 +32,7 @@ export class Relief {
   readonly #bias_m: number;
 
   /** @param ids reads object ids as well, for `idAt` */
-  constructor(layers: readonly imageLayer[], viewState: ViewState, ids = false) {
+  constructor(layers: readonly ImageLayer[], viewState: ViewState, ids = false) {
     const { camera, origin, dpr, finer } = viewState;
     [this.camera, this.origin, this.dpr] = [camera, origin, dpr];
     const px = cssPixelM(camera) / dpr;
@@ -51,7 +51,7 @@ export class Relief {
    * tiles are replaced by those in memory; the result is `approximate` then, and where the level is not the deepest.
    */
   static async fetch(
-    layers: readonly imageLayer[],
+    layers: readonly ImageLayer[],
     viewState: ViewState,
     [low, high]: Rect,
     maxTiles: number,
@@ -64,9 +64,7 @@ export class Relief {
     while (zoom > 0 && across(zoom) > maxTiles) zoom--;
     const relief = new Relief(layers, { ...viewState, camera: { ...viewState.camera, zoom }, dpr: 1, finer: 0 }, ids);
     await Promise.allSettled(relief.#layers.flatMap((layer) => layer.fetch([low, high])));
-    relief.#layers.forEach((layer) => {
-      layer.clearPatches();
-    });
+    relief.#layers.forEach((layer) => layer.clearPatches());
     // Tiles may have failed, or have been dropped before the last one arrived.
     return { relief, approximate: zoom < frame.zmax || !relief.#layers.every((layer) => layer.isLoaded([low, high])) };
   }
@@ -148,7 +146,7 @@ const CHILD_LEVELS = 2;
 
 /** A layer's depths in the camera's frame. */
 class LayerDepths {
-  readonly #layer: imageLayer;
+  readonly #layer: ImageLayer;
   readonly #view: View;
   readonly #fetchTile: (kind: "depth" | "id", tile: Tile) => Promise<unknown>;
   readonly #read: (kind: "depth" | "id", tile: Tile) => Uint32Array | "empty" | undefined;
@@ -165,13 +163,13 @@ class LayerDepths {
   /** Id of the object whose depth was read last. */
   id = 0;
 
-  static create(layer: imageLayer, viewState: ViewState, px: number, ids: boolean): LayerDepths | null {
+  static create(layer: ImageLayer, viewState: ViewState, px: number, ids: boolean): LayerDepths | null {
     const [view, { rendering, tiles }] = [layer.findView(viewState.camera.frame), layer];
     return view && tiles && rendering?.layers.has("depth") ? new LayerDepths(layer, view, rendering, tiles, viewState, px, ids) : null;
   }
 
   private constructor(
-    layer: imageLayer,
+    layer: ImageLayer,
     view: View,
     { json, layers }: Rendering,
     store: LayerTiles,

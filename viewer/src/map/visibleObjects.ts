@@ -1,6 +1,6 @@
 import { cssPixelM } from "../geo/camera";
 import { findCover, computeLevel, computeViewRect } from "../tiles/cover";
-import type { imageLayer } from "./imageLayer";
+import type { ImageLayer } from "./imageLayer";
 import { computeCenter } from "./layerPlan";
 import type { ViewState } from "./layerContext";
 
@@ -13,10 +13,10 @@ export interface VisibleObject {
 
 /** Finds the visible objects of layers: those of the last layer first, the largest of each layer first. @param hidden includes objects that styles hide  @throws the error of a fetch */
 export async function findAllVisibleObjects(
-  layers: readonly imageLayer[],
+  layers: readonly ImageLayer[],
   viewState: ViewState,
   hidden: boolean,
-): Promise<(VisibleObject & { readonly layer: imageLayer })[]> {
+): Promise<(VisibleObject & { readonly layer: ImageLayer })[]> {
   const found = await Promise.all(
     [...layers].reverse().map(async (layer) => (await findVisibleObjects(layer, viewState, hidden)).map((seen) => ({ ...seen, layer }))),
   );
@@ -24,7 +24,7 @@ export async function findAllVisibleObjects(
 }
 
 /** Finds the visible objects of a layer, the largest first. Fetches the id tiles of the shown level. */
-async function findVisibleObjects(layer: imageLayer, viewState: ViewState, hidden: boolean): Promise<VisibleObject[]> {
+async function findVisibleObjects(layer: ImageLayer, viewState: ViewState, hidden: boolean): Promise<VisibleObject[]> {
   const { camera, dpr, finer } = viewState;
   const [view, info] = [layer.findView(camera.frame), layer.rendering?.layers.get("id")];
   const { rendering, tiles } = layer;

@@ -1,7 +1,7 @@
 import { add, clamp, sub, type Vec2, type Vec3 } from "../core/vec";
 import { localFromUvd, uvdFromLocal } from "../geo/axes";
 import type { Frame } from "../geo/frame";
-import type { map } from "../map3d";
+import type { Map3D } from "../map3d";
 import { RegionGrower, type PlanarRegion, type GridBounds } from "./regionGrower";
 
 /** A flat face of one object, as far as it is visible. */
@@ -37,7 +37,7 @@ const [TOLERANCE_PX, TOLERANCE_M] = [8, 0.5];
  * Measures the face at a position on the surface (world), in the current view: the pixels of one object that are in one plane. Fetches tiles as the face
  * grows. Returns null where the position is hidden or the surface is not flat. @throws the signal's reason
  */
-export async function measureFace(map: map, position: Vec3, { signal }: FaceOptions = {}): Promise<Face | null> {
+export async function measureFace(map: Map3D, position: Vec3, { signal }: FaceOptions = {}): Promise<Face | null> {
   const state = map.getViewState();
   if (!state) return null;
   const { axes, u0, v0, size, zmax, tilePx } = state.camera.frame;

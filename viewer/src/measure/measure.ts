@@ -1,7 +1,7 @@
 import { adoptStyles } from "../core/dom";
 import { asError } from "../core/errors";
 import type { Vec3 } from "../core/vec";
-import { MapLayer, type ClickEvent, type map } from "../map3d";
+import { MapLayer, type ClickEvent, type Map3D } from "../map3d";
 import { measureArea, measureLine, type AreaMeasure, type LineMeasure } from "./geometry";
 import { ProfileChart } from "./profileChart";
 import { measureFace, type Face } from "./face";
@@ -38,13 +38,11 @@ export interface MeasureEvents {
  * Measures on the surface. Each click adds a corner; Backspace removes the last one, Escape all. Positions are read from the deepest level, whatever level
  * is shown.
  */
-export class measure extends MapLayer<map, MeasureEvents> {
+export class Measure extends MapLayer<Map3D, MeasureEvents> {
   readonly options: Required<Omit<MeasureOptions, "language">> & Pick<MeasureOptions, "language">;
   #messages = new MeasureMessages(undefined);
   readonly #overlay = new MeasureOverlay();
-  readonly #chart = new ProfileChart((at) => {
-    this.#onCursorMove(at);
-  });
+  readonly #chart = new ProfileChart((at) => this.#onCursorMove(at));
   #corners: readonly Corner[] = [];
   #profile: Profile | null = null;
   #face: Face | null = null;
@@ -116,7 +114,7 @@ export class measure extends MapLayer<map, MeasureEvents> {
     return this.setCorners([]);
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     this.#messages = new MeasureMessages(this.options.language ?? map.language);
     adoptStyles(document, STYLES);
     map.overlayPane.append(this.#overlay.box);
@@ -128,7 +126,7 @@ export class measure extends MapLayer<map, MeasureEvents> {
     void this.#read();
   }
 
-  protected onRemove(map: map): void {
+  protected onRemove(map: Map3D): void {
     map.frameEvents.off("move", this.#updateOverlay);
     map.off("click", this.#onClick);
     map.container.removeEventListener("keydown", this.#onKeyDown);
@@ -179,7 +177,7 @@ export class measure extends MapLayer<map, MeasureEvents> {
     });
   }
 
-  async #readFace(map: map, signal: AbortSignal): Promise<void> {
+  async #readFace(map: Map3D, signal: AbortSignal): Promise<void> {
     const face = await measureFace(map, this.#points()[0] as Vec3, { signal });
     if (signal.aborted) return;
     this.#face = face;
@@ -187,7 +185,7 @@ export class measure extends MapLayer<map, MeasureEvents> {
     this.fire("face", { face });
   }
 
-  async #readProfile(map: map, signal: AbortSignal): Promise<void> {
+  async #readProfile(map: Map3D, signal: AbortSignal): Promise<void> {
     const profile = await measureProfile(map, this.#points(), { signal });
     if (signal.aborted) return;
     this.#profile = profile;
@@ -220,9 +218,7 @@ export class measure extends MapLayer<map, MeasureEvents> {
     return this.#corners.map(({ position }) => position);
   }
 
-  readonly #updateOverlay = (): void => {
-    this.#overlay.update((world) => this.map?.project(world) ?? null);
-  };
+  readonly #updateOverlay = (): void => this.#overlay.update((world) => this.map?.project(world) ?? null);
 
   #draw(): void {
     const points = this.#points();

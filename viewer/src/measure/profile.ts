@@ -1,6 +1,6 @@
 import { add, clamp, dot, sub, type Vec2, type Vec3 } from "../core/vec";
 import type { Axes } from "../geo/axes";
-import type { map, Relief } from "../map3d";
+import type { Map3D, Relief } from "../map3d";
 
 /** Heights of the visible surface along a line: the upper outline of a vertical section. */
 export interface Profile {
@@ -27,7 +27,11 @@ const PARTS = 8;
 const MAX_STEP_PX = 12;
 
 /** Measures heights along a line through points (world; their heights are ignored), in the current view. @throws the signal's reason */
-export async function measureProfile(map: map, points: readonly Vec3[], { samples = 400, signal }: ProfileOptions = {}): Promise<Profile> {
+export async function measureProfile(
+  map: Map3D,
+  points: readonly Vec3[],
+  { samples = 400, signal }: ProfileOptions = {},
+): Promise<Profile> {
   const places = samplePoints(points, clamp(Math.round(samples), 2, 10_000));
   const heights_m = new Float64Array(places.length).fill(NaN);
   const distances_m = Float64Array.from(places, ({ distance_m }) => distance_m);

@@ -36,25 +36,12 @@ export class ProfileChart {
       this.#heights,
     );
     this.box.append(field, this.#readout);
-    this.box.addEventListener("pointermove", ({ clientX }) => {
-      this.#moveTo(clientX);
-    });
-    this.box.addEventListener("pointerdown", ({ clientX }) => {
-      this.#moveTo(clientX);
-    });
-    this.box.addEventListener("pointerleave", () => {
-      this.#show(null);
-    });
-    this.box.addEventListener("blur", () => {
-      this.#show(null);
-    });
-    this.box.addEventListener("keydown", (event) => {
-      this.#onKeyDown(event);
-    });
-    for (const type of ["pointerdown", "wheel", "click", "dblclick"])
-      this.box.addEventListener(type, (event) => {
-        event.stopPropagation();
-      });
+    this.box.addEventListener("pointermove", ({ clientX }) => this.#moveTo(clientX));
+    this.box.addEventListener("pointerdown", ({ clientX }) => this.#moveTo(clientX));
+    this.box.addEventListener("pointerleave", () => this.#show(null));
+    this.box.addEventListener("blur", () => this.#show(null));
+    this.box.addEventListener("keydown", (event) => this.#onKeyDown(event));
+    for (const type of ["pointerdown", "wheel", "click", "dblclick"]) this.box.addEventListener(type, (event) => event.stopPropagation());
   }
 
   /** Index of the sample at the cursor; null without a cursor. */

@@ -25,9 +25,7 @@ export class CompositePass {
     const gl = this.#gl;
     const at = (name: string): WebGLUniformLocation | null => gl.getUniformLocation(this.#program, name);
     gl.useProgram(this.#program);
-    [color, depth].forEach((texture, unit) => {
-      this.#bind(unit, texture);
-    });
+    [color, depth].forEach((texture, unit) => this.#bind(unit, texture));
     gl.uniform1i(at("u_color"), 0);
     gl.uniform1i(at("u_depth"), 1);
     gl.uniform2i(at("u_corner"), x, screen.height - y - height);
@@ -40,9 +38,7 @@ export class CompositePass {
       1 - (2 * (y + height)) / screen.height,
     );
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
-    [0, 1].forEach((unit) => {
-      this.#bind(unit, null);
-    });
+    [0, 1].forEach((unit) => this.#bind(unit, null));
   }
 
   free(): void {

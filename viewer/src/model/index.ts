@@ -1,7 +1,7 @@
 /** map3d-model: shows 3D models between the images, drawn by the page's three.js. */
 export {
-  modelLayer,
-  modelLayer as ModelLayer,
+  ModelLayer,
+  ModelLayer as modelLayer,
   type ModelClick,
   type ModelLayerEvents,
   type ModelLayerOptions,

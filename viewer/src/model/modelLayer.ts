@@ -1,6 +1,6 @@
 import { prefersReducedMotion } from "../core/dom";
 import { add, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
-import { MapLayer, FetchError, UsageError, type map } from "../map3d";
+import { MapLayer, FetchError, UsageError, type Map3D } from "../map3d";
 import { readModelContents, disposeGpuResources, isSkinned, type ModelContents } from "./modelContents";
 import { ModelRenderer, type SceneModel } from "./modelRenderer";
 import type { ThreeAction, ThreeClip, ModelLoader, ThreeMixer, ThreeNode, Three } from "./threeTypes";
@@ -58,7 +58,7 @@ const MIN_REVISION = 155;
 const RAD = Math.PI / 180;
 
 /** A 3D model between the images: buildings hide it, it hides buildings, and the map's light lights it. The page passes in its own three.js, which draws it. */
-export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLayerEvents<T>> {
+export class ModelLayer<T extends Three = Three> extends MapLayer<Map3D, ModelLayerEvents<T>> {
   readonly needs = ["depth"] as const;
   readonly options: Readonly<ModelLayerOptions>;
   readonly #three: Three;
@@ -172,18 +172,18 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
     return this;
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     this.#start(map).catch((reason: unknown) => {
       if (this.map === map) this.#fail(map, reason instanceof Error ? reason : new Error(String(reason)));
     });
   }
 
-  protected onRemove(map: map): void {
+  protected onRemove(map: Map3D): void {
     if (this.#contents) disposeGpuResources(this.#contents.object); // before the renderer is disposed of, which knows its GPU resources
     ModelRenderer.remove(map, this.#three, this.#sceneModel);
   }
 
-  async #start(map: map): Promise<void> {
+  async #start(map: Map3D): Promise<void> {
     if (map.drawer === null) return; // the map has reported the error
     this.#loading ??= this.#load();
     const contents = await this.#loading.catch((reason: unknown) => {
@@ -192,11 +192,7 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
     });
     // A lost context cannot create resources.
     if (map.canvas.getContext("webgl2")?.isContextLost())
-      await new Promise<void>((resolve) =>
-        map.once("contextrestored", () => {
-          resolve();
-        }),
-      );
+      await new Promise<void>((resolve) => map.once("contextrestored", () => resolve()));
     if (this.map !== map) return;
     this.#contents ??= this.#addToPivot(contents);
     ModelRenderer.add(map, this.#three, this.#sceneModel);
@@ -244,7 +240,7 @@ export class modelLayer<T extends Three = Three> extends MapLayer<map, ModelLaye
     this.redraw();
   }
 
-  #fail(map: map, error: Error): void {
+  #fail(map: Map3D, error: Error): void {
     this.fire("error", { error });
     map.layerContext?.report(error);
   }

@@ -3,7 +3,7 @@ import { add, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { localFromUvd } from "../geo/axes";
 import { cssPixelM, uvFromScreen } from "../geo/camera";
 import type { Frame } from "../geo/frame";
-import { UsageError, type CustomLayer, type map, type FrameState } from "../map3d";
+import { UsageError, type CustomLayer, type Map3D, type FrameState } from "../map3d";
 import { CompositePass } from "./composite";
 import { depthRangeOf, screenRectCorner, threeLighting, screenRectOf, type ScreenRect } from "./projection";
 import type { ThreeLight, ThreeNode, Three, ThreeCamera, ThreeHit, ThreeRenderer, ThreeTarget } from "./threeTypes";
@@ -31,7 +31,7 @@ const MAX_STEP_S = 0.25;
 /** Hit tolerance of lines and points, CSS pixels. */
 const TOLERANCE_PX = 4;
 
-const renderers = new WeakMap<map, Map<Three, ModelRenderer>>();
+const renderers = new WeakMap<Map3D, Map<Three, ModelRenderer>>();
 
 /**
  * Renders all models of a map with one three.js renderer and scene.
@@ -42,7 +42,7 @@ const renderers = new WeakMap<map, Map<Three, ModelRenderer>>();
  * far planes are the frame's range of D has the same depth values as the images.
  */
 export class ModelRenderer implements CustomLayer {
-  readonly #map: map;
+  readonly #map: Map3D;
   readonly #three: Three;
   readonly #renderer: ThreeRenderer;
   readonly #scene: ThreeNode;
@@ -58,7 +58,7 @@ export class ModelRenderer implements CustomLayer {
   #contextLost = false;
 
   /** Adds a model to a map. @throws UsageError when the map does not draw with WebGL */
-  static add(map: map, three: Three, model: SceneModel): void {
+  static add(map: Map3D, three: Three, model: SceneModel): void {
     const gl = map.drawer === "webgl" ? map.canvas.getContext("webgl2") : null;
     if (!gl) throw new UsageError(NEEDS_WEBGL);
     const ofMap = renderers.get(map) ?? new Map<Three, ModelRenderer>();
@@ -70,7 +70,7 @@ export class ModelRenderer implements CustomLayer {
   }
 
   /** Removes a model; with the last one, frees all GPU resources. */
-  static remove(map: map, three: Three, { pivot }: SceneModel): void {
+  static remove(map: Map3D, three: Three, { pivot }: SceneModel): void {
     const renderer = renderers.get(map)?.get(three);
     if (!renderer || !renderer.#models.delete(pivot)) return;
     renderer.#scene.remove(pivot);
@@ -79,7 +79,7 @@ export class ModelRenderer implements CustomLayer {
     renderer.#dispose();
   }
 
-  private constructor(map: map, three: Three, gl: WebGL2RenderingContext) {
+  private constructor(map: Map3D, three: Three, gl: WebGL2RenderingContext) {
     this.#map = map;
     this.#three = three;
     this.#renderer = new three.WebGLRenderer({ canvas: map.canvas, context: gl });
@@ -217,9 +217,8 @@ export class ModelRenderer implements CustomLayer {
     found?.model.clicked(point, found.position, found.hit);
   };
 
-  readonly #onMouseMove = ({ point }: { point: Vec2 }): void => {
+  readonly #onMouseMove = ({ point }: { point: Vec2 }): unknown =>
     this.#map.container.classList.toggle("map3d-over-model", this.#hitTest(point) !== null);
-  };
 
   /** Returns the nearest model under a point of the screen if it has a click listener and, as far as depths are known, no image hides it. */
   #hitTest(point: Vec2): { model: SceneModel; position: Vec3; hit: ThreeHit } | null {

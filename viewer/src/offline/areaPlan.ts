@@ -2,7 +2,7 @@ import { add, clamp, sub, type Box3, type Vec2, type Vec3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { projectedBox } from "../geo/camera";
 import { DEEPEST_LEVEL, childrenOf } from "../geo/frame";
-import { UsageError, type LayerInfo, type map, type Rendering, type Tile, type View } from "../map3d";
+import { UsageError, type LayerInfo, type Map3D, type Rendering, type Tile, type View } from "../map3d";
 
 /** The part of a map to save. */
 export interface AreaOptions {
@@ -29,7 +29,10 @@ const LAST_COMPLETE_LEVEL = 1;
 const OPTIONAL_LAYERS = ["depth2", "picture"];
 
 /** Fills in the defaults. @throws UsageError when the map is not ready, or for unknown layers and directions */
-export async function resolveOptions(shown: map, { bounds, levels, layers, directions, objects = true }: AreaOptions): Promise<FilledArea> {
+export async function resolveOptions(
+  shown: Map3D,
+  { bounds, levels, layers, directions, objects = true }: AreaOptions,
+): Promise<FilledArea> {
   const renderings = shown.layers.flatMap(({ rendering }) => rendering ?? []);
   if (renderings.length === 0) throw new UsageError('the map is not ready; wait for its event "ready"');
   const known = {
@@ -56,7 +59,7 @@ export async function resolveOptions(shown: map, { bounds, levels, layers, direc
 }
 
 /** Returns the box above the ground that is in view when each direction looks at the centre of the screen: at the surface there, or at the ground if it is not known. */
-async function boundsInView(shown: map, renderings: readonly Rendering[], directions: readonly string[]): Promise<Box3> {
+async function boundsInView(shown: Map3D, renderings: readonly Rendering[], directions: readonly string[]): Promise<Box3> {
   const {
     metresPerPixel: px_m,
     container: { clientWidth, clientHeight },

@@ -4,7 +4,7 @@ import {
   HttpSource,
   UsageError,
   type AttributeInfo,
-  type map,
+  type Map3D,
   type Rendering,
   type Tile,
   type View,
@@ -56,7 +56,7 @@ interface OfflineRendering {
 const SAMPLES = 6;
 
 /** Estimates the number of tiles and bytes of an area. Fetches a few tiles to sample their sizes. @throws UsageError, FetchError */
-export async function estimateArea(shown: map, options: AreaOptions = {}): Promise<AreaEstimate> {
+export async function estimateArea(shown: Map3D, options: AreaOptions = {}): Promise<AreaEstimate> {
   const area = await resolveOptions(shown, options);
   return estimate(await openRenderings(shown), area);
 }
@@ -65,20 +65,16 @@ export async function estimateArea(shown: map, options: AreaOptions = {}): Promi
  * Saves an area of a map, and the page, in the browser. With the service worker of `registerWorker`, both open offline. The area is complete only when all its
  * files are saved. @throws UsageError, FetchError when a request fails, StorageError when storage is full, or the signal's reason
  */
-export async function downloadArea(shown: map, options: DownloadOptions = {}): Promise<StoredArea> {
+export async function downloadArea(shown: Map3D, options: DownloadOptions = {}): Promise<StoredArea> {
   const { name = "area", concurrency = 6, onProgress, signal } = options;
   const area = await resolveOptions(shown, options);
   const ending = new AbortController();
-  const stop = (): void => {
-    ending.abort(signal?.reason);
-  };
+  const stop = (): void => ending.abort(signal?.reason);
   signal?.throwIfAborted();
   signal?.addEventListener("abort", stop);
   try {
     const store = await storage().open(CACHE + name);
-    const cache = new OfflineCache(store, (error) => {
-      ending.abort(error);
-    });
+    const cache = new OfflineCache(store, (error) => ending.abort(error));
     const renderings = await openRenderings(shown, cache);
     const before = await readArea(name);
     const { tiles, bytes, free_bytes } = await estimate(renderings, area);
@@ -119,7 +115,7 @@ export async function downloadArea(shown: map, options: DownloadOptions = {}): P
 }
 
 /** Opens the map's renderings and reads their current manifests. */
-async function openRenderings(shown: map, cache?: OfflineCache): Promise<OfflineRendering[]> {
+async function openRenderings(shown: Map3D, cache?: OfflineCache): Promise<OfflineRendering[]> {
   return Promise.all(
     shown.layers
       .filter(({ rendering }) => rendering)
@@ -178,10 +174,10 @@ async function runParallel<T>(items: Iterator<T>, concurrency: number, run: (ite
 /** Collects the attribute shards of the objects in the tiles of the deepest level. */
 class ShardCollector {
   readonly #shards = new Map<Rendering, Set<number>>();
-  readonly #shown: map;
+  readonly #shown: Map3D;
   readonly #last: number;
 
-  constructor(shown: map, { levels: [, last] }: FilledArea, renderings: readonly OfflineRendering[]) {
+  constructor(shown: Map3D, { levels: [, last] }: FilledArea, renderings: readonly OfflineRendering[]) {
     [this.#shown, this.#last] = [shown, last];
     for (const { rendering } of renderings) this.#shards.set(rendering, new Set());
   }

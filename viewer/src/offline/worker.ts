@@ -26,12 +26,8 @@ const tags = new Map<string, string>();
 let cacheFirstUntil = 0;
 let cacheList: { readonly until: number; readonly names: Promise<string[]> } | undefined;
 
-scope.addEventListener("install", (event) => {
-  event.waitUntil(scope.skipWaiting());
-});
-scope.addEventListener("activate", (event) => {
-  event.waitUntil(scope.clients.claim());
-});
+scope.addEventListener("install", (event) => event.waitUntil(scope.skipWaiting()));
+scope.addEventListener("activate", (event) => event.waitUntil(scope.clients.claim()));
 scope.addEventListener("fetch", (event) => {
   const { request } = event;
   if (request.method === "GET" && request.url.startsWith("http") && request.cache !== "only-if-cached") event.respondWith(respond(request));
@@ -67,9 +63,7 @@ async function networkFirst(request: Request, find: () => Promise<Response | und
   const pending = fetch(request);
   let timer: ReturnType<typeof setTimeout> | undefined;
   const timeout = new Promise<null>((resolve) => {
-    timer = setTimeout(() => {
-      resolve(null);
-    }, TIMEOUT_MS);
+    timer = setTimeout(() => resolve(null), TIMEOUT_MS);
   });
   const response = await Promise.race([pending, timeout]).catch(() => null);
   clearTimeout(timer);

@@ -22,9 +22,7 @@ export function fadeOut(element: HTMLElement, duration_ms: number, waits: () => 
       return;
     }
     copy.style.opacity = "0";
-    setTimeout(() => {
-      copy.remove();
-    }, duration_ms + 100);
+    setTimeout(() => copy.remove(), duration_ms + 100);
   };
   requestAnimationFrame(() => requestAnimationFrame(fade));
 }

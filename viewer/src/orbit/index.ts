@@ -1,6 +1,6 @@
 /** map3d-orbit: animates changes of the view. */
 import { features } from "../map3d";
-import { orbit } from "./orbit";
+import { Orbit } from "./orbit";
 
-features["orbit"] = orbit;
-export { orbit, orbit as Orbit, type OrbitOptions } from "./orbit";
+features["orbit"] = Orbit;
+export { Orbit, Orbit as orbit, type OrbitOptions } from "./orbit";

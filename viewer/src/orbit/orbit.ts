@@ -3,7 +3,7 @@ import { clamp, type Vec2, type Vec3 } from "../core/vec";
 import { computeAxes, uvdFromLocal } from "../geo/axes";
 import type { Camera } from "../geo/camera";
 import type { Frame } from "../geo/frame";
-import { MapLayer, type TransitionFrame, type map, type ViewTransition } from "../map3d";
+import { MapLayer, type TransitionFrame, type Map3D, type ViewTransition } from "../map3d";
 import { fadeOut } from "./fade";
 import { Warp, type RgbdImage } from "./warp";
 
@@ -61,7 +61,7 @@ const angularDistance = (a: ViewAngles, b: ViewAngles): number => Math.hypot(ang
  * right mouse button rotate freely between views; on release, the map moves to the nearest view. Without WebGL the views cross-fade; under
  * `prefers-reduced-motion` they switch at once. Reads depth tiles.
  */
-export class orbit extends MapLayer<map, object> implements ViewTransition {
+export class Orbit extends MapLayer<Map3D, object> implements ViewTransition {
   /** The 2D canvas cross-fades without depth. */
   get needs(): readonly "depth"[] {
     return this.map?.drawer === "webgl" ? ["depth"] : [];
@@ -77,11 +77,11 @@ export class orbit extends MapLayer<map, object> implements ViewTransition {
     this.#duration_ms = duration_ms;
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     map.setTransition(this);
   }
 
-  protected onRemove(map: map): void {
+  protected onRemove(map: Map3D): void {
     this.#finish();
     map.setTransition(null);
   }

@@ -83,9 +83,7 @@ export class Warp {
     gl.depthFunc(gl.LEQUAL);
     gl.depthMask(true);
     gl.useProgram(this.#warp);
-    images.forEach((image, k) => {
-      this.#warpImage(image, view, warped[k as 0 | 1]);
-    });
+    images.forEach((image, k) => this.#warpImage(image, view, warped[k as 0 | 1]));
     gl.disable(gl.DEPTH_TEST);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, canvas.width, canvas.height);

@@ -1,54 +1,55 @@
-import { checkOptions } from "../core/check";
 import { element } from "../core/dom";
 import { getFeature } from "../core/features";
+import { fillOptions, option, optionOr, type FilledOptionsOf, type OptionsOf } from "../core/options";
 import type { EnableDragging, OverlayHost } from "../core/overlayHost";
 import type { AnyPosition } from "../core/position";
 import type { Vec2, Vec3 } from "../core/vec";
-import { popup, type PopupOptions } from "./popup";
+import { Popup, type PopupOptions } from "./popup";
 import { PositionedLayer } from "./positionedLayer";
 
-/** Options of a marker. */
-export interface MarkerOptions {
+const MARKER_OPTIONS = {
   /** Any CSS colour; default: the map's accent colour. */
-  color?: string;
+  color: option<string>(),
   /** false: the label shows only while the marker is hovered or focused. Default true. */
-  showLabel?: boolean;
+  showLabel: optionOr<boolean>(true),
   /** Replaces the dot, centred on the position. Strings are shown as text. Default: a dot. */
-  icon?: string | Node;
+  icon: option<string | Node>(),
   /** What happens while the marker is behind a building: nothing, it fades, or it hides. Default "none". */
-  occlusion?: "none" | "fade" | "hide";
+  occlusion: optionOr<"none" | "fade" | "hide">("none"),
   /** Can be dragged over the surface or, while focused, moved with the arrow keys (with Shift in small steps); needs the entry `drag`. Default false. */
-  draggable?: boolean;
-}
+  draggable: optionOr<boolean>(false),
+};
+
+/** Options of a marker. */
+export interface MarkerOptions extends OptionsOf<typeof MARKER_OPTIONS> {}
 
 /** Events of a marker. */
 export interface MarkerEvents {
   /** Clicked, tapped, or Enter pressed. */
-  click: { marker: marker };
-  select: { marker: marker };
-  deselect: { marker: marker };
-  dragstart: { marker: marker };
+  click: { marker: Marker };
+  select: { marker: Marker };
+  deselect: { marker: Marker };
+  dragstart: { marker: Marker };
   /** Moved by the pointer or the keyboard. */
-  drag: { marker: marker; position: Vec3 };
-  dragend: { marker: marker; position: Vec3 };
+  drag: { marker: Marker; position: Vec3 };
+  dragend: { marker: Marker; position: Vec3 };
 }
 
 /** A labelled position. */
-export class marker extends PositionedLayer<MarkerEvents> {
-  readonly options: Required<Omit<MarkerOptions, "color" | "icon">> & Pick<MarkerOptions, "color" | "icon">;
+export class Marker extends PositionedLayer<MarkerEvents> {
+  readonly options: FilledOptionsOf<typeof MARKER_OPTIONS>;
   readonly needs: readonly "depth"[];
   #button: HTMLButtonElement | undefined;
   #label: string;
   #place: AnyPosition;
   #offset: Vec2 = [0, 0];
-  #popup: popup | undefined;
+  #popup: Popup | undefined;
   #selected = false;
 
   /** @throws UsageError for anything but a position, or an unknown option */
   constructor(label: string, position: AnyPosition, options: MarkerOptions = {}) {
     super(position);
-    checkOptions(options, ["color", "showLabel", "icon", "occlusion", "draggable"]);
-    this.options = { showLabel: true, occlusion: "none", draggable: false, ...options };
+    this.options = fillOptions(MARKER_OPTIONS, options);
     if (this.options.draggable) getFeature("drag", "draggable");
     this.needs = this.options.draggable || this.options.occlusion !== "none" ? ["depth"] : [];
     [this.#label, this.#place] = [label, position];
@@ -92,7 +93,7 @@ export class marker extends PositionedLayer<MarkerEvents> {
   /** Opens a popup with this content above the marker when it is clicked. */
   bindPopup(content: string | Node, options: PopupOptions = {}): this {
     this.#popup?.remove();
-    this.#popup = new popup(content, this.#place, { offset_px: this.options.showLabel ? 58 : 14, ...options });
+    this.#popup = new Popup(content, this.#place, { offset_px: this.options.showLabel ? 58 : 14, ...options });
     return this;
   }
 
@@ -151,17 +152,13 @@ export class marker extends PositionedLayer<MarkerEvents> {
     );
     button.classList.toggle("map3d-marker-hover-label", !showLabel);
     if (color !== undefined) button.style.setProperty("--map3d-marker", color);
-    button.addEventListener("click", () => {
-      this.#onClick();
-    });
+    button.addEventListener("click", () => this.#onClick());
     if (draggable)
       (getFeature("drag", "draggable") as EnableDragging)(
         button,
         map,
         () => this.position,
-        (type, position) => {
-          this.#onDrag(type, position);
-        },
+        (type, position) => this.#onDrag(type, position),
       );
     return button;
   }

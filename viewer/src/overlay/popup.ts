@@ -1,18 +1,20 @@
-import { checkOptions } from "../core/check";
 import { element, iconButton } from "../core/dom";
 import { getMapMessages } from "../core/i18n";
+import { fillOptions, optionOr, type FilledOptionsOf, type OptionsOf } from "../core/options";
 import type { OverlayHost } from "../core/overlayHost";
 import type { AnyPosition } from "../core/position";
 import type { Vec3 } from "../core/vec";
 import { PositionedLayer } from "./positionedLayer";
 
-/** Options of a popup. */
-export interface PopupOptions {
+const POPUP_OPTIONS = {
   /** Distance above the position, CSS pixels. Default 14. */
-  offset_px?: number;
+  offset_px: optionOr<number>(14),
   /** Shows a close button. Default true. */
-  closeButton?: boolean;
-}
+  closeButton: optionOr<boolean>(true),
+};
+
+/** Options of a popup. */
+export interface PopupOptions extends OptionsOf<typeof POPUP_OPTIONS> {}
 
 /** Events of a popup. */
 export interface PopupEvents {
@@ -25,15 +27,14 @@ export interface PopupEvents {
 const CLOSE = "M6 6l12 12M18 6L6 18";
 
 /** A box with text or DOM content that points at a position (world coordinates). */
-export class popup extends PositionedLayer<PopupEvents> {
-  readonly options: Required<PopupOptions>;
+export class Popup extends PositionedLayer<PopupEvents> {
+  readonly options: FilledOptionsOf<typeof POPUP_OPTIONS>;
   readonly #box: HTMLElement;
   readonly #body: HTMLElement;
 
   constructor(content: string | Node, position: AnyPosition = [0, 0, 0], options: PopupOptions = {}) {
     super(position);
-    checkOptions(options, ["offset_px", "closeButton"]);
-    this.options = { offset_px: 14, closeButton: true, ...options };
+    this.options = fillOptions(POPUP_OPTIONS, options);
     this.#body = element("div", "map3d-popup-body");
     this.#box = element("div", "map3d-popup", { role: "dialog" }, this.#body);
     if (this.options.closeButton) this.#addCloseButton();

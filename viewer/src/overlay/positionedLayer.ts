@@ -52,8 +52,6 @@ export abstract class PositionedLayer<E extends object> extends MapLayer<Overlay
       .then((found) => {
         if (this.#given === given && this.map === map) this.setPosition(found);
       })
-      .catch((reason: unknown) => {
-        map.report(asError(reason));
-      });
+      .catch((reason: unknown) => map.report(asError(reason)));
   }
 }

@@ -31,9 +31,7 @@ export class DataDecoder {
   #start(): Worker {
     const url = URL.createObjectURL(new Blob([workerCode], { type: "text/javascript" }));
     const worker = new Worker(url, { name: "map3d portrayal decoder" });
-    worker.onmessage = ({ data }: MessageEvent<DataResponse>) => {
-      this.#settle(data);
-    };
+    worker.onmessage = ({ data }: MessageEvent<DataResponse>) => this.#settle(data);
     worker.onerror = (event) => {
       const error = new DecodeError(
         `cannot run the decoder: ${event.message || "the worker is blocked; add worker-src blob: to the page's Content-Security-Policy"}`,
@@ -42,9 +40,7 @@ export class DataDecoder {
       this.#pending.clear();
       this.#end();
     };
-    setTimeout(() => {
-      URL.revokeObjectURL(url);
-    }, IDLE_MS);
+    setTimeout(() => URL.revokeObjectURL(url), IDLE_MS);
     return worker;
   }
 
@@ -53,10 +49,7 @@ export class DataDecoder {
     this.#pending.delete(response.id);
     if ("error" in response) pending?.reject(new DecodeError(response.error));
     else pending?.resolve(response.data);
-    if (this.#pending.size === 0)
-      this.#idleTimer = setTimeout(() => {
-        this.#end();
-      }, IDLE_MS);
+    if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => this.#end(), IDLE_MS);
   }
 
   #end(): void {

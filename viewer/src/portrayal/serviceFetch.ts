@@ -36,14 +36,10 @@ export function fetchAnswer(request: FetchRequest): Promise<ServiceAnswer> {
 async function fetchOnce(request: FetchRequest): Promise<ServiceAnswer | FailedAttempt> {
   const { url, where, signal } = request;
   const ending = new AbortController();
-  const stop = (): void => {
-    ending.abort();
-  };
+  const stop = (): void => ending.abort();
   signal?.throwIfAborted();
   signal?.addEventListener("abort", stop);
-  const timer = setTimeout(() => {
-    ending.abort(LATE);
-  }, TIMEOUT_MS);
+  const timer = setTimeout(() => ending.abort(LATE), TIMEOUT_MS);
   try {
     return await readAnswer(await request.fetch(url, { signal: ending.signal }), request, stop);
   } catch (reason) {

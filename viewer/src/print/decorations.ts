@@ -1,5 +1,5 @@
 import { SCALE_BAR_MAX_PX, formatLength, floorToRound } from "../core/lengths";
-import type { map } from "../map3d";
+import type { Map3D } from "../map3d";
 
 /** A legend; a `theme` has this shape. */
 export interface PictureLegend {
@@ -34,7 +34,7 @@ export class Decorations {
   readonly #height: number;
 
   /** Copies the current state of the map. @param scale picture pixels per CSS pixel of the map  @param unit picture pixels per CSS pixel of text */
-  constructor(map: map, context: CanvasRenderingContext2D, scale: number, unit: number) {
+  constructor(map: Map3D, context: CanvasRenderingContext2D, scale: number, unit: number) {
     [this.#context, this.#unit] = [context, unit];
     [this.#width, this.#height] = [context.canvas.width / unit, context.canvas.height / unit];
     this.#lookAt_deg = map.lookAt_deg;
@@ -68,9 +68,7 @@ export class Decorations {
     const lines = this.#wrap(text, 18, 600, this.#width * 0.6);
     const width = Math.max(...lines.map((line) => this.#widthOf(line, 18, 600)));
     this.#panel(MARGIN, MARGIN, width + 2 * PAD, lines.length * ROW + PAD);
-    lines.forEach((line, k) => {
-      this.#text(line, MARGIN + PAD, MARGIN + PAD / 2 + (k + 0.5) * ROW, 18, 600);
-    });
+    lines.forEach((line, k) => this.#text(line, MARGIN + PAD, MARGIN + PAD / 2 + (k + 0.5) * ROW, 18, 600));
   }
 
   /** Draws legend, scale bar and attribution, from the bottom up. */
@@ -137,9 +135,7 @@ export class Decorations {
     this.#context.fillStyle = PANEL;
     this.#context.fillRect(this.#width - width - 16, this.#height - height, width + 16, height);
     this.#context.textAlign = "right";
-    lines.forEach((line, k) => {
-      this.#text(line, this.#width - 8, this.#height - height + 3 + (k + 0.5) * 15, 11, 400, FAINT);
-    });
+    lines.forEach((line, k) => this.#text(line, this.#width - 8, this.#height - height + 3 + (k + 0.5) * 15, 11, 400, FAINT));
     this.#context.textAlign = "left";
     return height;
   }

@@ -1,4 +1,4 @@
-import { DrawError, UsageError, type map } from "../map3d";
+import { DrawError, UsageError, type Map3D } from "../map3d";
 import { Decorations, type PictureLegend } from "./decorations";
 import { drawPieces, type PieceOptions } from "./pieces";
 
@@ -42,7 +42,7 @@ export const LONGEST_SIDE_PX = 8192;
  * needs. @throws UsageError for a size out of range or an invalid colour; FetchError or DecodeError when a tile fails; DrawError when the browser has too little
  * memory
  */
-export async function exportPicture(shown: map, options: PictureOptions = {}): Promise<Blob> {
+export async function exportPicture(shown: Map3D, options: PictureOptions = {}): Promise<Blob> {
   const { clientWidth, clientHeight } = shown.canvas;
   const { width_px, height_px, scale: requested = (width_px ?? NaN) / clientWidth || (height_px ?? NaN) / clientHeight || 2 } = options;
   const [width, height] = [width_px ?? Math.round(clientWidth * requested), height_px ?? Math.round(clientHeight * requested)];

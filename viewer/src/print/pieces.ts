@@ -1,7 +1,7 @@
 import { element } from "../core/dom";
 import type { Vec3 } from "../core/vec";
 import type { Camera } from "../geo/camera";
-import { DecodeError, DrawError, FetchError, map, UsageError, type Addable, type imageLayer } from "../map3d";
+import { DecodeError, DrawError, FetchError, Map3D, UsageError, type Addable, type ImageLayer } from "../map3d";
 
 /** Size and scale of the picture. */
 export interface PictureExtent {
@@ -29,7 +29,7 @@ const PIECE_PX = 1024;
 
 /** Draws the view of a map piece by piece, with a second map off the screen. @throws the error of a tile, or the signal's reason */
 export async function drawPieces(
-  shown: map,
+  shown: Map3D,
   { width, height, scale }: PictureExtent,
   into: CanvasRenderingContext2D,
   { signal, progress }: PieceOptions,
@@ -82,18 +82,18 @@ function createBox(width: number, height: number): HTMLElement {
 
 /** A map off the screen with copies of another map's layers. */
 class OffscreenMap {
-  readonly map: map;
+  readonly map: Map3D;
   readonly #box: HTMLElement;
-  readonly #layers: readonly imageLayer[];
-  readonly #shown: readonly imageLayer[];
+  readonly #layers: readonly ImageLayer[];
+  readonly #shown: readonly ImageLayer[];
   readonly #failed: Promise<never>;
   /** Estimates light as on the map; undefined: nothing does. */
   readonly #shade: Addable<never> | undefined;
 
-  constructor(shown: map, box: HTMLElement, scale: number) {
+  constructor(shown: Map3D, box: HTMLElement, scale: number) {
     this.#box = box;
     const { light, drawer, options } = shown;
-    this.map = new map(box, {
+    this.map = new Map3D(box, {
       light,
       ...(drawer && { drawer }),
       direction: shown.direction,
@@ -112,9 +112,9 @@ class OffscreenMap {
       this.map.on("error", ({ error }) => {
         if ([FetchError, DecodeError, DrawError].some((kind) => error instanceof kind)) reject(error);
       });
-      this.map.on("contextlost", () => {
-        reject(new DrawError("the graphics context was lost during the export; try again or choose a smaller size"));
-      });
+      this.map.on("contextlost", () =>
+        reject(new DrawError("the graphics context was lost during the export; try again or choose a smaller size")),
+      );
     });
     this.#failed.catch(() => undefined);
     this.#shown = shown.layers.filter(({ rendering }) => rendering);
@@ -187,16 +187,8 @@ class OffscreenMap {
     signal?.throwIfAborted();
     const ending = new AbortController();
     const aborted = new Promise<never>((_, reject) => {
-      signal?.addEventListener(
-        "abort",
-        () => {
-          reject(signal.reason as Error);
-        },
-        { signal: ending.signal },
-      );
+      signal?.addEventListener("abort", () => reject(signal.reason as Error), { signal: ending.signal });
     });
-    await Promise.race([done, this.#failed, aborted]).finally(() => {
-      ending.abort();
-    });
+    await Promise.race([done, this.#failed, aborted]).finally(() => ending.abort());
   }
 }

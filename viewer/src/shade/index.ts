@@ -1,6 +1,6 @@
 /** map3d-shade: screen-space shadows and ambient occlusion. */
 import { features } from "../map3d";
-import { shade } from "./shade";
+import { Shade } from "./shade";
 
-features["shade"] = shade;
-export { shade, shade as Shade, type ShadeOptions } from "./shade";
+features["shade"] = Shade;
+export { Shade, Shade as shade, type ShadeOptions } from "./shade";

@@ -20,9 +20,7 @@ export class Legend {
         swatch,
         element("span", "", {}, label),
       );
-      button.addEventListener("click", () => {
-        this.#toggle(k);
-      });
+      button.addEventListener("click", () => this.#toggle(k));
       return button;
     });
     const rows = this.#buttons.map((button) => element("li", "", {}, button));
@@ -37,9 +35,7 @@ export class Legend {
 
   #toggle(k: number): void {
     if (!this.#pressed.delete(k)) this.#pressed.add(k);
-    this.#buttons.forEach((button, at) => {
-      button.setAttribute("aria-pressed", String(this.#pressed.has(at)));
-    });
+    this.#buttons.forEach((button, at) => button.setAttribute("aria-pressed", String(this.#pressed.has(at))));
     this.box.classList.toggle("map3d-legend-filtered", this.#pressed.size > 0);
     this.#onChange(this.#pressed);
   }

@@ -1,5 +1,5 @@
 import { adoptStyles } from "../core/dom";
-import { MapLayer, UsageError, type AttributeInfo, type AttributeValue, type ColumnSummary, type imageLayer, type map } from "../map3d";
+import { MapLayer, UsageError, type AttributeInfo, type AttributeValue, type ColumnSummary, type ImageLayer, type Map3D } from "../map3d";
 import { classify, type Classification, type ThemeClass } from "./classes";
 import { Legend } from "./legend";
 import { STYLES } from "./styles";
@@ -28,9 +28,9 @@ export interface ThemeEvents {
 }
 
 /** Colours a layer's objects by an attribute. Pressing classes in the legend shows only those. Replaces the layer's style. */
-export class theme extends MapLayer<map, ThemeEvents> {
+export class Theme extends MapLayer<Map3D, ThemeEvents> {
   readonly options: ThemeOptions;
-  readonly #layer: imageLayer;
+  readonly #layer: ImageLayer;
   readonly #name: string;
   readonly #info: AttributeInfo | undefined;
   #legend: Legend | undefined;
@@ -42,7 +42,7 @@ export class theme extends MapLayer<map, ThemeEvents> {
   #onMoveEnd: (() => void) | undefined;
 
   /** @param attribute its name, or one of the layer's `attributes()` */
-  constructor(layer: imageLayer, attribute: string | AttributeInfo, options: ThemeOptions = {}) {
+  constructor(layer: ImageLayer, attribute: string | AttributeInfo, options: ThemeOptions = {}) {
     super();
     this.#layer = layer;
     this.#name = typeof attribute === "string" ? attribute : attribute.name;
@@ -65,12 +65,12 @@ export class theme extends MapLayer<map, ThemeEvents> {
     return this.options.title ?? this.#name;
   }
 
-  protected onAdd(map: map): void {
+  protected onAdd(map: Map3D): void {
     adoptStyles(document, STYLES);
     this.#run(map, this.#load(map));
   }
 
-  protected onRemove(map: map): void {
+  protected onRemove(map: Map3D): void {
     if (this.#onMoveEnd) map.off("moveend", this.#onMoveEnd);
     this.#legend?.box.remove();
     this.#legend = this.#onMoveEnd = undefined;
@@ -80,7 +80,7 @@ export class theme extends MapLayer<map, ThemeEvents> {
   }
 
   /** Reports the failure of a task. */
-  #run(map: map, task: Promise<void>): void {
+  #run(map: Map3D, task: Promise<void>): void {
     task.catch((reason: unknown) => {
       if (this.map !== map) return;
       const error = reason instanceof Error ? reason : new Error(String(reason));
@@ -89,7 +89,7 @@ export class theme extends MapLayer<map, ThemeEvents> {
     });
   }
 
-  async #load(map: map): Promise<void> {
+  async #load(map: Map3D): Promise<void> {
     if (!this.#layer.rendering) await new Promise((ready) => this.#layer.once("ready", ready));
     const info = this.#info ?? (await this.#findAttribute());
     const summary = await this.#layer.columnSummary(info);
@@ -112,7 +112,7 @@ export class theme extends MapLayer<map, ThemeEvents> {
   }
 
   /** Adds the objects in view to the classes, now and after each movement: reads the shards with their values. */
-  async #follow(map: map, info: AttributeInfo, { shard_size, shards }: ColumnSummary, { add }: Classification): Promise<void> {
+  async #follow(map: Map3D, info: AttributeInfo, { shard_size, shards }: ColumnSummary, { add }: Classification): Promise<void> {
     const read = new Set<number>();
     const follow = async (): Promise<void> => {
       const seen = new Set(
@@ -135,13 +135,7 @@ export class theme extends MapLayer<map, ThemeEvents> {
       if (this.map === map) this.#applyStyle(this.#pressed);
     };
     await follow();
-    if (this.map === map)
-      map.on(
-        "moveend",
-        (this.#onMoveEnd = () => {
-          this.#run(map, follow());
-        }),
-      );
+    if (this.map === map) map.on("moveend", (this.#onMoveEnd = () => this.#run(map, follow())));
   }
 
   async #findAttribute(): Promise<AttributeInfo> {
@@ -151,14 +145,12 @@ export class theme extends MapLayer<map, ThemeEvents> {
     return info;
   }
 
-  #show(map: map, classification: Classification): void {
+  #show(map: Map3D, classification: Classification): void {
     this.#classes = classification.classes;
     this.#applyStyle(this.#pressed);
     const { legend } = this.options;
     if (legend !== null) {
-      this.#legend = new Legend(this.title, classification, (chosen) => {
-        this.#applyStyle(chosen);
-      });
+      this.#legend = new Legend(this.title, classification, (chosen) => this.#applyStyle(chosen));
       (legend ?? map.overlayPane).append(this.#legend.box);
     }
     this.fire("ready", { classes: this.#classes });

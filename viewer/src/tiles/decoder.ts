@@ -51,9 +51,7 @@ export class Decoder {
   #startWorker(): Worker {
     this.#url ??= URL.createObjectURL(new Blob([workerCode], { type: "text/javascript" }));
     const worker = new Worker(this.#url, { name: "map3d decoder" });
-    worker.onmessage = ({ data }: MessageEvent<DecodeResponse>) => {
-      this.#settle(data);
-    };
+    worker.onmessage = ({ data }: MessageEvent<DecodeResponse>) => this.#settle(data);
     worker.onerror = (event) => {
       this.#rejectAll(
         `cannot run the tile decoder: ${event.message || "the worker is blocked; add worker-src blob: to the page's Content-Security-Policy"}`,
@@ -68,10 +66,7 @@ export class Decoder {
     this.#pending.delete(response.id);
     if ("error" in response) pending?.reject(new DecodeError(response.error));
     else pending?.resolve(response.data);
-    if (this.#pending.size === 0)
-      this.#idleTimer = setTimeout(() => {
-        this.#endWorkers();
-      }, IDLE_MS);
+    if (this.#pending.size === 0) this.#idleTimer = setTimeout(() => this.#endWorkers(), IDLE_MS);
   }
 
   #rejectAll(message: string): void {

@@ -187,9 +187,7 @@ export class LayerTiles {
         if (signal.aborted || asError(reason).name !== "AbortError") throw reason;
       }
     }
-    const own = this.#source.tile(view, layer, tile, signal).finally(() => {
-      this.#fetching.delete(key);
-    });
+    const own = this.#source.tile(view, layer, tile, signal).finally(() => this.#fetching.delete(key));
     this.#fetching.set(key, own);
     return own;
   }
@@ -198,10 +196,7 @@ export class LayerTiles {
   #waitForServer(tries: number): void {
     const retry_ms = computeRetry(SERVER_WAIT_MS, tries);
     this.#silence = { tries, retry_ms };
-    if (retry_ms < Infinity)
-      setTimeout(() => {
-        this.#onArrival(null);
-      }, retry_ms - performance.now());
+    if (retry_ms < Infinity) setTimeout(() => this.#onArrival(null), retry_ms - performance.now());
   }
 }
 

@@ -1,9 +1,9 @@
 import { adoptStyles, element } from "../core/dom";
-import type { imageLayer, TooltipContent } from "../map3d";
+import type { ImageLayer, TooltipContent } from "../map3d";
 import { STYLES } from "./styles";
 
 /** Shows a box beside the pointer while it is over an object of a layer. Returns what removes it. */
-export function bindTooltip(layer: imageLayer, content: TooltipContent, getPane: () => HTMLElement | undefined): () => void {
+export function bindTooltip(layer: ImageLayer, content: TooltipContent, getPane: () => HTMLElement | undefined): () => void {
   adoptStyles(document, STYLES);
   const box = element("div", "map3d-tooltip", { role: "tooltip" });
   let shown = 0;

@@ -25,7 +25,7 @@ async function start(
   await opened.page.evaluate(
     async ([service, given, forMap]) => {
       const g = globalThis as unknown as Showing;
-      const { map: Map, imageLayer: Layer } = (globalThis as unknown as Global).map3d;
+      const { Map3D: Map, ImageLayer: Layer } = (globalThis as unknown as Global).map3d;
       g.map = new Map("mapcanvas", { preserveDrawingBuffer: true, language: "en", ...forMap });
       g.layer = new Layer(g.map3d.portrayalSource(service, given)).addTo(g.map);
       await new Promise<void>((done) => {
@@ -106,7 +106,7 @@ test.each<[string, Record<string, unknown>, string]>([
   const message = await page.evaluate(
     async ([service, given]) => {
       const g = globalThis as unknown as Showing;
-      const { map: Map, imageLayer: Layer } = (globalThis as unknown as Global).map3d;
+      const { Map3D: Map, ImageLayer: Layer } = (globalThis as unknown as Global).map3d;
       const shown = new Map("mapcanvas");
       return new Promise<string>((done) => {
         shown.on("error", ({ error }) => {

@@ -1,8 +1,8 @@
 import { expect, test } from "vitest";
-import type { map, Vec3 } from "../../src/map3d";
+import type { Map3D, Vec3 } from "../../src/map3d";
 import { embedCode } from "../../src/element/embedCode";
 
-const view = (fields: object): map =>
+const view = (fields: object): Map3D =>
   ({
     center: [691015.04, 5336015, 520] as Vec3,
     direction: "0-45",
@@ -10,7 +10,7 @@ const view = (fields: object): map =>
     light: { azimuth_deg: 215, altitude_deg: 48 },
     time: null,
     ...fields,
-  }) as unknown as map;
+  }) as unknown as Map3D;
 
 test("the lines show the present view and light, with names escaped", () => {
   expect(embedCode(view({}), { src: "/town/", label: 'Our "office" <b> & more' }))

@@ -4,7 +4,7 @@ import { add } from "../../src/core/vec";
 import { uvdFromLocal } from "../../src/geo/axes";
 import type { Frame } from "../../src/geo/frame";
 import { pixelM } from "../../src/geo/frame";
-import type { map } from "../../src/map3d";
+import type { Map3D } from "../../src/map3d";
 import { measureArea } from "../../src/measure/geometry";
 import { measureFace, type Face } from "../../src/measure/face";
 import { loopsOf } from "../../src/measure/outline";
@@ -51,7 +51,7 @@ const town =
   };
 
 /** A map that shows a surface, pixel by pixel; `asked`: the number of tiles requested from it. */
-function mapOf(frame: Frame, surface: Surface = town(frame), asked: number[] = []): map {
+function mapOf(frame: Frame, surface: Surface = town(frame), asked: number[] = []): Map3D {
   return {
     getViewState: () => ({ camera: { frame }, origin: ORIGIN }),
     fetchRelief: (_: unknown, [low, high]: readonly [Vec2, Vec2], most: number) => {
@@ -69,7 +69,7 @@ function mapOf(frame: Frame, surface: Surface = town(frame), asked: number[] = [
       };
       return Promise.resolve({ relief, approximate: z < frame.zmax });
     },
-  } as unknown as map;
+  } as unknown as Map3D;
 }
 
 /** Returns the positions on a face that rays reach. */

@@ -8,7 +8,7 @@ import { fillHeights, drapedHeight } from "../../src/geojson/drape";
 import { readGeojson } from "../../src/geojson/parse";
 import { coordinateTransform } from "../../src/geojson/coordinates";
 import { clipped, sectionsOf } from "../../src/geojson/lineSections";
-import type { imageLayer } from "../../src/map/imageLayer";
+import type { ImageLayer } from "../../src/map/imageLayer";
 import { Relief } from "../../src/map/relief";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN, trace } from "../fixture/town";
@@ -28,7 +28,7 @@ interface Made {
 }
 
 /** A layer whose tiles are in memory. */
-function layerOf({ opacity = 1, hidden, gone }: Made = {}): imageLayer {
+function layerOf({ opacity = 1, hidden, gone }: Made = {}): ImageLayer {
   const stored = (view: View, info: LayerInfo, tile: Tile): unknown => {
     const raw = tileName(tile) === gone ? undefined : town.raw.get(`${view.id}/${info.name}/${tileName(tile)}`);
     return (
@@ -45,10 +45,10 @@ function layerOf({ opacity = 1, hidden, gone }: Made = {}): imageLayer {
     isHidden: (id: number) => id === hidden,
     findView: ({ id }: Frame) => rendering.views.get(id),
     tiles: { get: stored },
-  } as unknown as imageLayer;
+  } as unknown as ImageLayer;
 }
 
-function reliefOf(layers: readonly imageLayer[], direction = "0-45"): Relief {
+function reliefOf(layers: readonly ImageLayer[], direction = "0-45"): Relief {
   const { frame } = rendering.views.get(direction) as View;
   return new Relief(layers, { camera: { frame, u: 0, v: 0, zoom: 3, width: 800, height: 600 }, origin: ORIGIN, dpr: 1, finer: 0 });
 }
@@ -97,7 +97,7 @@ describe("relief", () => {
 
   test("hidden objects, invisible layers and unknown depths hide nothing; a missing tile is read from a level above", () => {
     const tower: Vec3 = [32, 40, 5];
-    const covers = (...layers: imageLayer[]): boolean =>
+    const covers = (...layers: ImageLayer[]): boolean =>
       reliefOf(layers).isPositionOccluded([ORIGIN[0] + tower[0], ORIGIN[1] + tower[1], ORIGIN[2] + tower[2]]);
     expect(covers(layerOf())).toBe(true);
     expect(covers(layerOf({ hidden: 2_000_000_001 }))).toBe(false);

@@ -4,11 +4,12 @@ import type { Vec3 } from "../../src/core/vec";
 import { DEFAULT_LIGHT, clampLight } from "../../src/geo/light";
 import { readManifest } from "../../src/geo/manifest";
 import { CameraController } from "../../src/map/cameraController";
-import { imageLayer } from "../../src/map/imageLayer";
-import { map } from "../../src/map/map";
-import { DEFAULTS } from "../../src/map/options";
+import { ImageLayer } from "../../src/map/imageLayer";
+import { Map3D } from "../../src/map/map";
+import { fillOptions } from "../../src/core/options";
+import { MAP_OPTIONS, type FilledOptions } from "../../src/map/options";
 import { Viewport } from "../../src/map/viewport";
-import { marker } from "../../src/overlay/marker";
+import { Marker } from "../../src/overlay/marker";
 
 const RENDERING = readManifest(
   {
@@ -36,7 +37,7 @@ const RENDERING = readManifest(
 
 /** A map's camera without a map. */
 class Controller extends CameraController {
-  readonly options = { ...DEFAULTS, dataSaver: false };
+  readonly options = fillOptions(MAP_OPTIONS, { dataSaver: false }) as FilledOptions;
   protected readonly size = { width: 800, height: 600, dpr: 1 };
   protected requestFrame(): void {
     /* nothing is drawn */
@@ -125,7 +126,7 @@ describe("a camera", () => {
 });
 
 describe("markers and layers", () => {
-  const make = (given: unknown[]) => (): unknown => new (marker as unknown as new (...args: unknown[]) => unknown)(...given);
+  const make = (given: unknown[]) => (): unknown => new (Marker as unknown as new (...args: unknown[]) => unknown)(...given);
 
   test.each([
     [["Town hall"], /position: expected \[x, y, z\].*got undefined/],
@@ -138,7 +139,7 @@ describe("markers and layers", () => {
   });
 
   test("a marker keeps its position when it is given a wrong one, and knows its events", () => {
-    const pin = new marker("Town hall", [1, 2, 3]);
+    const pin = new Marker("Town hall", [1, 2, 3]);
     expect(() => pin.setPosition([4, 5] as unknown as Vec3)).toThrow(UsageError);
     expect(pin.position).toEqual([1, 2, 3]);
     expect(() => (pin as unknown as Loose)["on"]?.("mouseover", () => undefined)).toThrow(
@@ -152,17 +153,17 @@ describe("markers and layers", () => {
     const layer =
       (...given: unknown[]) =>
       (): unknown =>
-        new (imageLayer as unknown as new (...args: unknown[]) => unknown)(...given);
+        new (ImageLayer as unknown as new (...args: unknown[]) => unknown)(...given);
     for (const urls of [undefined, null, "", [], [undefined], 3]) expect(layer(urls)).toThrow(/needs at least one base URL/);
     expect(layer("town", { opactiy: 0.5 })).toThrow('unknown option "opactiy"; use mode, opacity, highlightColor, attribution, combine');
     expect(layer("town", { opacity: "0.5" })).toThrow('opacity: expected a number, got "0.5"');
-    expect(() => (new imageLayer("town") as unknown as Loose)["on"]?.("load", () => undefined)).toThrow(
+    expect(() => (new ImageLayer("town") as unknown as Loose)["on"]?.("load", () => undefined)).toThrow(
       'unknown event "load"; use ready, error, click, mouseover, mouseout, mousemove',
     );
-    expect(() => new imageLayer("town").bindTooltip("a")).toThrow(
+    expect(() => new ImageLayer("town").bindTooltip("a")).toThrow(
       'bindTooltip needs the entry tooltip: load map3d-tooltip.js after map3d.js, or import "map3d/tooltip"',
     );
-    expect(() => new imageLayer("town").setOpacity(NaN)).toThrow(UsageError);
+    expect(() => new ImageLayer("town").setOpacity(NaN)).toThrow(UsageError);
   });
 });
 
@@ -237,6 +238,6 @@ describe("a map", () => {
     [{ concurrency: NaN }, /concurrency: expected a number/],
   ])("options %j are refused", (options, message) => {
     stubPage();
-    expect(() => new map("canvas", options as object)).toThrow(message);
+    expect(() => new Map3D("canvas", options as object)).toThrow(message);
   });
 });

@@ -7,7 +7,7 @@ import { tileName, type Tile } from "../../src/geo/frame";
 import { readManifest } from "../../src/geo/manifest";
 import { isVersioned, pageKey, rangeResponse, rangeKey, rangeOf } from "../../src/offline/cacheKeys";
 import { resolveOptions, tilesIn, tilesOf, type AreaOptions } from "../../src/offline/areaPlan";
-import type { map } from "../../src/map3d";
+import type { Map3D } from "../../src/map3d";
 import { findCover, type Rect } from "../../src/tiles/cover";
 import { ORIGIN } from "../fixture/town";
 import { renderTown } from "../fixture/rendering";
@@ -34,7 +34,7 @@ const shown = {
   unproject: () => [ORIGIN[0], ORIGIN[1] + 20, ORIGIN[2] - 2],
   pick: () => Promise.resolve({ position: [ORIGIN[0], ORIGIN[1], ORIGIN[2] - 2 + 20] }),
   metresPerPixel: 0.1,
-} as unknown as map;
+} as unknown as Map3D;
 const planned = async (options: AreaOptions): Promise<string[]> =>
   [...tilesOf(town, await resolveOptions(shown, options))]
     .map(({ view, layer, tile }) => `${view.id}/${layer.name}/${tileName(tile)}`)
@@ -151,7 +151,7 @@ describe("tiles of an area", () => {
   });
 
   test("a map without a manifest is an error", async () => {
-    await expect(resolveOptions({ layers: [] } as unknown as map, {})).rejects.toThrow(/is not ready/);
+    await expect(resolveOptions({ layers: [] } as unknown as Map3D, {})).rejects.toThrow(/is not ready/);
   });
 });
 

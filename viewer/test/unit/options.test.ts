@@ -1,18 +1,23 @@
 import { readdirSync, readFileSync } from "node:fs";
 import { join, resolve } from "node:path";
 import { expect, test } from "vitest";
+import { MAP_OPTIONS } from "../../src/map/options";
 
 const SRC = resolve(import.meta.dirname, "../../src");
+const README = readFileSync(join(SRC, "../README.md"), "utf8");
 const FILES = readdirSync(SRC, { recursive: true, encoding: "utf8" }).filter((name) => name.endsWith(".ts"));
 
-/** Lists the optional fields of the option types of a file, with their comments. */
+/** Lists the options that a file declares, in types or in tables, with their comments. */
 function listOptions(text: string): { name: string; comment: string }[] {
   const types = [...text.matchAll(/^export interface (\w*Options)\b[^{]*\{\n(.*?)^\}/gms)];
-  return types.flatMap(([, type = "", body = ""]) =>
-    [...body.matchAll(/(?:\/\*\*((?:(?!\*\/).)*)\*\/\s*)?^ {2}(?:readonly )?(\w+)\?:/gms)].map(([, comment = "", name = ""]) => ({
-      name: `${type}.${name}`,
-      comment,
-    })),
+  const tables = [...text.matchAll(/^(?:export )?const (\w*_OPTIONS) = \{\n(.*?)^\}/gms)];
+  return [...types, ...tables].flatMap(([, type = "", body = ""]) =>
+    [...body.matchAll(/(?:\/\*\*((?:(?!\*\/).)*)\*\/\s*)?^ {2}(?:readonly )?(\w+)(?:\?:|: option)/gms)].map(
+      ([, comment = "", name = ""]) => ({
+        name: `${type}.${name}`,
+        comment,
+      }),
+    ),
   );
 }
 
@@ -23,7 +28,16 @@ test("every option is documented beside its declaration, with its default", () =
   expect(OPTIONS.filter(({ comment }) => !/default|@internal/i.test(comment)).map(({ name }) => name)).toEqual([]);
 });
 
+test("the README lists the options of the map", () => {
+  const [, table = ""] = /^## `map`.*?^\| option \|.*?\n(.*?)\n\n/ms.exec(README) ?? [];
+  const named = table.split("\n").flatMap((row) => [...(row.split("|")[1] ?? "").matchAll(/`(\w+)`/g)].map(([, name]) => name));
+  expect(named.sort()).toEqual(
+    Object.keys(MAP_OPTIONS)
+      .filter((name) => name !== "finer")
+      .sort(),
+  );
+});
+
 test("the README repeats no defaults", () => {
-  const readme = readFileSync(join(SRC, "../README.md"), "utf8");
-  expect(readme).not.toMatch(/^\| option \| default/m);
+  expect(README).not.toMatch(/^\| option \| default/m);
 });

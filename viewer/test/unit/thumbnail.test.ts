@@ -4,7 +4,7 @@ import { showThumbnail } from "../../src/element/thumbnail";
 import { cssPixelM, screenFromUv, type Camera } from "../../src/geo/camera";
 import { uvOfPixel } from "../../src/geo/frame";
 import { readManifest, type Rendering } from "../../src/geo/manifest";
-import type { imageLayer, map } from "../../src/map3d";
+import type { ImageLayer, Map3D } from "../../src/map3d";
 
 const WEBP = "UklGRiQAAABXRUJQVlA4==";
 const GOOD = { window: [76, 95.5, 102, 70.5], webp: WEBP };
@@ -59,7 +59,7 @@ class Stand extends Evented<{ load: object }> {
     super();
     this.layer = { rendering, mode: "lit", opacity: 1 };
     this.camera = { frame: rendering.views.get(shown)?.frame as Camera["frame"], u: -37, v: 61.5, zoom: 1.3, width: 900, height: 500 };
-    showThumbnail(this as unknown as map, this.layer as unknown as imageLayer);
+    showThumbnail(this as unknown as Map3D, this.layer as unknown as ImageLayer);
   }
 
   get metresPerPixel(): number {

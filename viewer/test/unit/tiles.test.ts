@@ -2,7 +2,7 @@ import { afterEach, describe, expect, test, vi } from "vitest";
 import { PMTiles, zxyToTileId, type Source as PmSource } from "pmtiles";
 import { gzipSync } from "node:zlib";
 import { makeFrame, type Tile } from "../../src/geo/frame";
-import { DEFAULTS } from "../../src/map/options";
+import { MAP_OPTIONS } from "../../src/map/options";
 import { Cache, computeCacheBytes } from "../../src/tiles/cache";
 import { findCover, sortFromCenter, computeLevel, findFallbacks, type Rect } from "../../src/tiles/cover";
 import { fetchBytes, type FetchFunction } from "../../src/tiles/fetch";
@@ -212,7 +212,7 @@ describe("cache size", () => {
     ["a laptop", 1440, 900, 2],
     ["a desk", 1920, 1080, 1],
   ])("the cache of %s, %i × %i at %i, holds the tiles of three views", (_, width, height, dpr) => {
-    const finer = Math.min(0, Math.log2(DEFAULTS.maxTileRatio / dpr));
+    const finer = Math.min(0, Math.log2(MAP_OPTIONS.maxTileRatio[0] / dpr));
     const finest = dpr > 1 ? dpr * 2 ** finer : Math.SQRT2; // tile pixels per CSS pixel: see computeLevel
     const view_bytes = (width * finest + 256) * (height * finest + 256) * 7; // colours and normals
     expect(computeCacheBytes({ dpr, finer }, width * height * dpr ** 2)).toBeGreaterThan(3 * view_bytes);

@@ -5,7 +5,7 @@ import { makeFrame, pixelM, uvOfPixel } from "../../src/geo/frame";
 import type { ManifestJson, Rendering } from "../../src/geo/manifest";
 import { findIncompatibility } from "../../src/map/compatibility";
 import { findCombinedLayers, groupByDepth } from "../../src/map/depthGroups";
-import type { imageLayer } from "../../src/map/imageLayer";
+import type { ImageLayer } from "../../src/map/imageLayer";
 import { NO_DEPTH } from "../../src/tiles/tileData";
 
 const VIEW = { id: "0-45", look_at_deg: 0, pitch_deg: 45, u0_m: -50, v0_m: 40, d0_m: -1000 };
@@ -72,8 +72,8 @@ test("clips overlap if they have a point in common", () => {
 });
 
 test("combined layers form one group at the position of the first", () => {
-  const layer = (name: string, combines: boolean, clip: Clip | null = null): imageLayer =>
-    ({ name, isCombinable: combines, clip }) as unknown as imageLayer;
+  const layer = (name: string, combines: boolean, clip: Clip | null = null): ImageLayer =>
+    ({ name, isCombinable: combines, clip }) as unknown as ImageLayer;
   const [a, b, c, d] = [layer("a", false), layer("b", true), layer("c", false), layer("d", true)];
   expect(groupByDepth([a, b, c, d])).toEqual([[a], [b, d], [c]]);
   expect(findCombinedLayers([a, b, c])).toEqual([]);

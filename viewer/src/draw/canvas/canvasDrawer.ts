@@ -40,16 +40,10 @@ export class CanvasDrawer implements Drawer {
 
   /** @param preserve draws on the canvas itself, so that its pixels can be read  @throws DrawError when the canvas has another context, or the browser has no 2D canvas */
   constructor(canvas: HTMLCanvasElement, preserve: boolean, events: DrawerEvents) {
-    this.#compositor = new (preserve ? CanvasCompositor : CssCompositor)(canvas, () => {
-      events.changed();
-    });
+    this.#compositor = new (preserve ? CanvasCompositor : CssCompositor)(canvas, () => events.changed());
     this.#pictures = new TilePictures({
-      made: () => {
-        events.changed();
-      },
-      failed: (error) => {
-        events.failed(error);
-      },
+      made: () => events.changed(),
+      failed: (error) => events.failed(error),
     });
   }
 

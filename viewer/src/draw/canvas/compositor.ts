@@ -103,9 +103,7 @@ export class CssCompositor implements Compositor {
   }
 
   show(screen: FrameState, passes: readonly ComposedPass[]): void {
-    passes.forEach((pass, k) => {
-      this.#show(screen, pass, this.#getLayer(k));
-    });
+    passes.forEach((pass, k) => this.#show(screen, pass, this.#getLayer(k)));
     for (const { box, mosaic } of this.#layers.splice(passes.length)) {
       box.remove();
       mosaic.empty();

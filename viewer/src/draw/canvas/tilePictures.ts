@@ -129,9 +129,7 @@ export class TilePictures {
   #start(): Worker {
     const url = URL.createObjectURL(new Blob([workerCode], { type: "text/javascript" }));
     const worker = new Worker(url, { name: "map3d canvas" });
-    worker.onmessage = ({ data }: MessageEvent<ShadeResponse>) => {
-      this.#settle(data);
-    };
+    worker.onmessage = ({ data }: MessageEvent<ShadeResponse>) => this.#settle(data);
     worker.onerror = (event) => {
       this.stop();
       this.#events.failed(

@@ -103,9 +103,7 @@ export class WebGLDrawer implements Drawer {
       gl,
       frame,
       () => join(frame.passes.flatMap(({ relief }) => relief ?? [])) as Vec2,
-      (coarse, pass, range) => {
-        this.#drawPass(coarse, pass, range, false);
-      },
+      (coarse, pass, range) => this.#drawPass(coarse, pass, range, false),
     );
     const combined = frame.passes.filter(({ depths }) => depths);
     const range = frame.target?.range ?? estimator?.range ?? join(combined.flatMap(({ depths }) => depths ?? []));
