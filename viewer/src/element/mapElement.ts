@@ -32,10 +32,44 @@ interface SavedState {
 
 /** Attributes that add an entry of the same name to the map. */
 const FEATURES = ["orbit", "shade"];
+/** An attribute that is an option of the map: how it is read, and how a change is applied; without that, a change creates a new map. */
+interface OptionAttribute<T> {
+  /** @throws UsageError */
+  read(element: Element): T | undefined;
+  apply?(map: Map3D, value: T): unknown;
+}
+
+type OptionAttributes = { readonly [K in keyof MapOptions]?: OptionAttribute<NonNullable<MapOptions[K]>> };
+
+const text =
+  (name: string) =>
+  (element: Element): string | undefined =>
+    element.getAttribute(name) ?? undefined;
+
+/** The options of the map that are attributes of the same name; `lonlat` is another name of `center`. */
+const OPTIONS: OptionAttributes = {
+  center: { read: (element) => place(element, "center"), apply: (map, center) => map.setView(center) },
+  zoom: { read: (element) => number(element, "zoom"), apply: (map, zoom) => map.setZoom(zoom) },
+  direction: { read: text("direction"), apply: (map, direction) => map.setDirection(direction) },
+  light: { read: light, apply: (map, part) => map.setLight(part) },
+  background: { read: text("background"), apply: (map, background) => map.setBackground(background) },
+  drawer: { read: text("drawer") as OptionAttribute<NonNullable<MapOptions["drawer"]>>["read"] },
+  controls: { read: (element) => isOn(element, "controls") },
+  attribution: { read: (element) => isOn(element, "attribution") },
+  hover: { read: (element) => isOn(element, "hover") },
+  language: { read: text("language") },
+};
+const OPTION_ROWS = Object.entries(OPTIONS) as [string, OptionAttribute<unknown>][];
+
 /** Changes of these attributes create a new map. */
-const RECREATING: ReadonlySet<string> = new Set(["src", "language", "label", "controls", "attribution", "drawer", "hover", ...FEATURES]);
+const RECREATING: ReadonlySet<string> = new Set([
+  "src",
+  "label",
+  ...FEATURES,
+  ...OPTION_ROWS.flatMap(([name, { apply }]) => (apply ? [] : [name])),
+]);
 /** Changes of these attributes are applied to the map. */
-const APPLIED = ["direction", "center", "lonlat", "zoom", "light", "time", "mode", "opacity", "background"];
+const APPLIED = ["lonlat", "time", "mode", "opacity", ...OPTION_ROWS.flatMap(([name, { apply }]) => (apply ? [name] : []))];
 
 /** A map that forwards its events to its element. */
 class ForwardingMap extends Map3D {
@@ -212,36 +246,18 @@ export class MapElement extends PageElement implements ElementHost {
   // Attributes
 
   #options(): MapOptions {
-    const saved = this.#saved;
-    const [language, drawer, background] = ["language", "drawer", "background"].map((name) => this.getAttribute(name) ?? undefined);
-    const all = {
-      center: saved.center ?? this.#try(() => place(this, "center")),
-      zoom: saved.zoom ?? this.#try(() => number(this, "zoom")),
-      direction: saved.direction ?? this.getAttribute("direction") ?? undefined,
-      light: saved.light ?? this.#try(() => light(this)),
-      cover: true,
-      drawer: drawer as MapOptions["drawer"],
-      controls: isOn(this, "controls"),
-      attribution: isOn(this, "attribution"),
-      hover: isOn(this, "hover"),
-      language,
-      background,
-    };
-    return Object.fromEntries(Object.entries(all).filter(([, value]) => value !== undefined));
+    const given = OPTION_ROWS.map(([name, { read }]) => [name, this.#saved[name as keyof SavedState] ?? this.#try(() => read(this))]);
+    return Object.fromEntries([["cover", true], ...given].filter(([, value]) => value !== undefined)) as MapOptions;
   }
 
   /** Applies a changed attribute to the map. A removed attribute changes nothing, except for those of the layer. @throws UsageError */
   #apply(name: string): void {
     const map = this.#map as Map3D;
-    const value = this.getAttribute(name);
+    const option = OPTION_ROWS.find(([key]) => key === (name === "lonlat" ? "center" : name))?.[1];
     if (this.#base && (name === "mode" || name === "opacity")) updateLayer(this, this.#base, name);
-    else if (value === null) return;
-    else if (name === "direction") map.setDirection(value);
-    else if (name === "background") map.setBackground(value);
-    else if (name === "zoom") map.setZoom(number(this, name) ?? map.zoom);
-    else if (name === "center" || name === "lonlat") ifDefined(place(this, "center"), (center) => map.setView(center));
-    else if (name === "light") ifDefined(light(this), (part) => map.setLight(part));
+    else if (this.getAttribute(name) === null) return;
     else if (name === "time") ifDefined(time(this), (time) => map.setTime(time));
+    else ifDefined(option?.read(this), (value) => option?.apply?.(map, value));
   }
 
   /** Sets the light of the attributes, else that of rendered shadows. @throws UsageError */
