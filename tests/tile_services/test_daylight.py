@@ -34,7 +34,7 @@ def utc(text: str) -> datetime:
     return datetime.fromisoformat(text).replace(tzinfo=UTC)
 
 
-def altitude_deg(light: PictureLight) -> float:
+def elevation_deg(light: PictureLight) -> float:
     return math.degrees(math.asin(light.towards[2]))
 
 
@@ -46,13 +46,13 @@ def azimuth_deg(light: PictureLight) -> float:
 def test_the_colours_are_those_of_the_viewer(name):
     (text,) = re.findall(rf"const {name}: readonly ColorStop\[\] = (\[.*\]);", VIEWER.read_text())
     stops = json.loads(text.replace("WHITE", "[1, 1, 1]"))
-    assert [[altitude, list(color)] for altitude, color in getattr(daylight, name)] == stops
+    assert [[elevation, list(color)] for elevation, color in getattr(daylight, name)] == stops
 
 
 def test_the_sun_stands_where_it_is():
     noon = light_at(PLACED, utc("2026-06-21T11:15"))
     assert math.isclose(np.linalg.norm(noon.towards), 1, abs_tol=1e-9)
-    assert altitude_deg(noon) == pytest.approx(90 - 48.14 + 23.44, abs=0.3)
+    assert elevation_deg(noon) == pytest.approx(90 - 48.14 + 23.44, abs=0.3)
     assert azimuth_deg(noon) == pytest.approx(180, abs=3)
     assert (noon.sun_rgb, noon.sky_rgb) == (daylight.WHITE, daylight.WHITE)
     morning, evening = light_at(PLACED, utc("2026-06-21T05:00")), light_at(PLACED, utc("2026-06-21T18:00"))

@@ -193,8 +193,8 @@ def test_outside_the_pyramid_is_transparent_or_the_colour_of_paper(town, pixels)
 
 def test_light_is_that_of_the_viewer():
     """Surfaces towards the light, level, away from it, and without a normal, by the formula of the viewer's shader in float64."""
-    azimuth, altitude = math.radians(215), math.radians(48)
-    towards = np.array([math.sin(azimuth) * math.cos(altitude), math.cos(azimuth) * math.cos(altitude), math.sin(altitude)])
+    azimuth, elevation = math.radians(215), math.radians(48)
+    towards = np.array([math.sin(azimuth) * math.cos(elevation), math.cos(azimuth) * math.cos(elevation), math.sin(elevation)])
     for normal in (towards, np.array([0, 0, 1.0]), -towards, None):
         code = np.zeros(3, np.uint8) if normal is None else np.rint((normal + 1) / 2 * 255).astype(np.uint8)
         got = light_colors(np.full((3, 3, 3), 120, np.uint8), np.broadcast_to(code, (3, 3, 3)))

@@ -38,7 +38,7 @@ await runPage(async (page, { page: address, shown, faults, pictures }) => {
       if (lit) {
         await Promise.all([new Promise((done) => map.once("idle", done)), layer.setMode("lit")]);
         const before = readPixel(map.project(places.at(-1)));
-        await Promise.all([new Promise((done) => map.once("idle", done)), map.setLight({ altitude_deg: 5, azimuth_deg: 0 })]);
+        await Promise.all([new Promise((done) => map.once("idle", done)), map.setLight({ elevation_deg: 5, azimuth_deg: 0 })]);
         light = [before, readPixel(map.project(places.at(-1)))];
       }
       layer.setMode("normal");

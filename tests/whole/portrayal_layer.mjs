@@ -51,7 +51,7 @@ await runPage(async (page, { origin, rendering, service, view, targets, position
   }, [MODES, targets]);
   const light = await page.evaluate(async () => {
     const before = pixels(maps[1].map);
-    await change((map) => map.setLight({ azimuth_deg: 20, altitude_deg: 12 }));
+    await change((map) => map.setLight({ azimuth_deg: 20, elevation_deg: 12 }));
     const [tiles, service] = maps.map(({ map }) => pixels(map));
     return { changed: differing(before, service), differing: differing(tiles, service) };
   });

@@ -28,7 +28,7 @@ export class Compare {
 
   constructor(context: CompareContext) {
     this.#context = context;
-    const pitches = context.view.directions.map(({ pitchDeg }) => pitchDeg);
+    const pitches = context.view.directions.map(({ pitch_deg }) => pitch_deg);
     this.#pitch_deg = pitches.find((pitch) => pitches.filter((other) => other === pitch).length >= TURNS_DEG.length);
     byId("compare").hidden = this.#pitch_deg === undefined;
     byId("compare").addEventListener("click", () => void this.#open().catch(report));
@@ -50,8 +50,8 @@ export class Compare {
     if (this.#end) return;
     document.body.classList.add("compares");
     const shown = view.directions.find(({ id }) => id === view.direction);
-    if (shown?.pitchDeg !== this.#pitch_deg)
-      view.setDirection(view.directions.find(({ pitchDeg }) => pitchDeg === this.#pitch_deg)?.id ?? view.direction);
+    if (shown?.pitch_deg !== this.#pitch_deg)
+      view.setDirection(view.directions.find(({ pitch_deg }) => pitch_deg === this.#pitch_deg)?.id ?? view.direction);
     for (let k = 1; k < TURNS_DEG.length; k++) this.#others.push(this.#addMap());
     this.#light();
     this.highlight();

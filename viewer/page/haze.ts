@@ -4,7 +4,7 @@ import { computeHaze } from "./hazeMask";
 /** Pixels of the mask along each side; it covers the square of a view. */
 const SIDE_PX = 128;
 
-type Rgb = readonly number[];
+type ColorBytes = readonly number[];
 type Draw = (context: CanvasRenderingContext2D) => void;
 
 /** Lets the content fade into the background towards its edge, over both drawers, and colours the background by the light of the sky. */
@@ -14,7 +14,7 @@ export class Haze {
   readonly #canvas = document.createElement("canvas");
   readonly #masks = new Map<string, Promise<Uint8ClampedArray | null>>();
   #mask: Uint8ClampedArray | null = null;
-  #rgb: Rgb = [];
+  #rgb: ColorBytes = [];
   #direction = "";
 
   /** @param layer one whose manifest has loaded */
@@ -50,7 +50,7 @@ export class Haze {
   }
 
   /** Returns a function that draws the present haze over a picture of the map; undefined without haze. @param paper the picture's background, if it is not that of the map */
-  capture(paper?: Rgb): Draw | undefined {
+  capture(paper?: ColorBytes): Draw | undefined {
     const [square, mask] = [this.#findSquare(), this.#mask];
     if (!square || !mask || this.#canvas.hidden || !this.#canvas.classList.contains("shown")) return undefined;
     const [x, y, size] = square;
@@ -118,7 +118,7 @@ export class Haze {
 }
 
 /** Fills a canvas with a colour of the opacity of a mask. */
-function fill(canvas: HTMLCanvasElement, mask: Uint8ClampedArray, rgb: Rgb): void {
+function fill(canvas: HTMLCanvasElement, mask: Uint8ClampedArray, rgb: ColorBytes): void {
   const image = new ImageData(SIDE_PX, SIDE_PX);
   mask.forEach((alpha, k) => image.data.set([...rgb, alpha], 4 * k));
   canvas.getContext("2d")?.putImageData(image, 0, 0);

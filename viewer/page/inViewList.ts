@@ -44,10 +44,10 @@ export function bindInViewList(view: Map3D, layer: () => ImageLayer, select: (id
   });
 }
 
-type Row = readonly [id: number, name: string];
+type ListRow = readonly [id: number, name: string];
 
 /** Lists the largest objects, each with all its parts once, without the ground. */
-async function objectsInView(view: Map3D, layer: ImageLayer): Promise<Row[]> {
+async function objectsInView(view: Map3D, layer: ImageLayer): Promise<ListRow[]> {
   const visible = (await view.objectsInView()).filter((object) => object.layer === layer).slice(0, MAX_PARTS);
   const wholes = await Promise.all(visible.map(({ id }) => findWhole<Described>(layer, { id })));
   const named = wholes
@@ -56,7 +56,7 @@ async function objectsInView(view: Map3D, layer: ImageLayer): Promise<Row[]> {
   return [...new Map(named)].slice(0, MAX_ROWS);
 }
 
-function listOf(rows: readonly Row[], select: (id: number) => void): HTMLElement {
+function listOf(rows: readonly ListRow[], select: (id: number) => void): HTMLElement {
   const list = document.createElement("ol");
   for (const [id, name] of rows) {
     const button = withText("button", name);

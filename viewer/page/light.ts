@@ -9,9 +9,9 @@ import { bindPlay } from "./playSun";
 export const FIRST_HOUR = 8;
 
 /** A summer sun for scenes of unknown location: from east over south to west, highest at 13:00. */
-export function lightAt(hour: number): Pick<Light, "azimuth_deg" | "altitude_deg"> {
+export function lightAt(hour: number): Pick<Light, "azimuth_deg" | "elevation_deg"> {
   const day = (hour - 6) / 14;
-  return { azimuth_deg: 75 + 210 * day, altitude_deg: 14 + 46 * Math.sin(Math.PI * day) };
+  return { azimuth_deg: 75 + 210 * day, elevation_deg: 14 + 46 * Math.sin(Math.PI * day) };
 }
 
 /** Binds the time slider, which moves the light through the selected day. It is disabled while the mode is not lit. */
@@ -79,7 +79,7 @@ function bindDay(view: Map3D, rendering: Rendering, requested: Date | undefined)
 /** Makes the slider last from dawn to dusk, and marks sunrise and sunset. */
 function showDay(time: HTMLInputElement, { json: { geographic } }: Rendering, moment: (hour: number) => Date): void {
   if (!geographic) return;
-  const { dawn, dusk, ...sun } = findDay((hour) => computeDaylight(moment(hour), geographic).altitude_deg);
+  const { dawn, dusk, ...sun } = findDay((hour) => computeDaylight(moment(hour), geographic).elevation_deg);
   [time.min, time.max, time.step] = [dawn, dusk, 1 / 12].map(String) as [string, string, string];
   byId("daylight").classList.toggle("located", sun.sunrise !== null && sun.sunset !== null && sun.sunrise < sun.sunset);
   for (const name of ["sunrise", "sunset"] as const) {

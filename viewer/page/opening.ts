@@ -17,8 +17,8 @@ const SEEN = "map3d-opening";
 
 /** Turns the map once around when it opens, slowly: once in a session, and until the first touch, turn of the wheel or key. Never with reduced motion, saved data, or fewer than three directions. */
 export function bindOpening(view: Map3D, turn: Orbit): void {
-  const pitch = view.directions.find(({ id }) => id === view.direction)?.pitchDeg;
-  const directions = view.directions.filter(({ pitchDeg }) => pitchDeg === pitch);
+  const pitch = view.directions.find(({ id }) => id === view.direction)?.pitch_deg;
+  const directions = view.directions.filter(({ pitch_deg }) => pitch_deg === pitch);
   if (directions.length < MIN_DIRECTIONS || view.drawer !== "webgl" || view.options.dataSaver || prefersReducedMotion() || wasSeen())
     return;
   let [stopped, turned, last] = [false, 0, 0];

@@ -130,9 +130,9 @@ export class Selection {
 
   /** Returns an action that shows the object from behind; undefined when no view has the opposite direction. */
   #showBack({ id, position }: ClickEvent): (() => void) | undefined {
-    const { directions, direction, lookAt_deg } = this.#view;
-    const pitch = directions.find((view) => view.id === direction)?.pitchDeg;
-    const opposite = directions.find(({ lookAtDeg, pitchDeg }) => pitchDeg === pitch && (lookAtDeg + 180) % 360 === lookAt_deg % 360);
+    const { directions, direction, lookAt_deg: ahead_deg } = this.#view;
+    const pitch = directions.find((view) => view.id === direction)?.pitch_deg;
+    const opposite = directions.find(({ lookAt_deg, pitch_deg }) => pitch_deg === pitch && (lookAt_deg + 180) % 360 === ahead_deg % 360);
     return (
       opposite &&
       (() => {

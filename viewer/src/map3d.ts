@@ -6,7 +6,7 @@ export { Popup, Popup as popup, type PopupEvents, type PopupOptions } from "./ov
 /** @internal */
 export { findHeight } from "./map/findPosition";
 /** @internal */
-export { features, getFeature } from "./core/features";
+export { plugins, getPlugin } from "./core/plugins";
 export type { TooltipContent } from "./map/options";
 export type { Corner } from "./core/corner";
 export { MapLayer, type Addable, type LayerHost } from "./core/mapLayer";
@@ -19,7 +19,7 @@ export type { ObjectStyle } from "./map/objectStyle";
 export type { VisibleObject } from "./map/visibleObjects";
 export type { Pick } from "./map/picker";
 export type { TransitionFrame, ViewTransition } from "./map/viewTransition";
-export type { Relief } from "./map/relief";
+export type { VisibleDepths } from "./map/visibleDepths";
 export type { EnableDragging, OverlayHost } from "./core/overlayHost";
 export type { Box3, Vec2, Vec3 } from "./core/vec";
 export type { Clip } from "./draw/depthMapping";

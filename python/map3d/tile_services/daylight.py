@@ -16,7 +16,7 @@ _TIME: Final = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}Z", re.A
 _YEARS: Final = range(1900, 2101)
 
 ColorStops = tuple[tuple[float, Vec3], ...]
-"""Colours by the sun's altitude in degrees, ascending; linear in between."""
+"""Colours by the sun's elevation in degrees, ascending; linear in between."""
 SUN: Final[ColorStops] = ((-1, (0, 0, 0)), (0.5, (0.42, 0.17, 0.06)), (4, (0.92, 0.58, 0.3)), (12, (1.04, 0.88, 0.68)), (30, WHITE))
 SKY: Final[ColorStops] = ((-12, (0.44, 0.5, 0.7)), (-6, (0.48, 0.54, 0.72)), (0, (0.6, 0.62, 0.74)), (8, (0.9, 0.93, 1)), (30, WHITE))
 """Those of the viewer: viewer/src/geo/daylight.ts."""
@@ -50,12 +50,12 @@ def light_at(manifest: Manifest, time: datetime) -> PictureLight:
     return PictureLight(towards, _color(SUN, sun.elevation_deg), _color(SKY, sun.elevation_deg))
 
 
-def _color(stops: ColorStops, altitude_deg: float) -> Vec3:
-    if altitude_deg <= stops[0][0]:
+def _color(stops: ColorStops, elevation_deg: float) -> Vec3:
+    if elevation_deg <= stops[0][0]:
         return stops[0][1]
     for (low, before), (high, after) in pairwise(stops):
-        if altitude_deg <= high:
-            share = (altitude_deg - low) / (high - low)
+        if elevation_deg <= high:
+            share = (elevation_deg - low) / (high - low)
             r, g, b = (a + (z - a) * share for a, z in zip(before, after, strict=True))
             return (r, g, b)
     return stops[-1][1]

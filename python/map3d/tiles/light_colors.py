@@ -26,10 +26,10 @@ class PictureLight:
     sky_rgb: Vec3 = WHITE
 
 
-def direction(azimuth_deg: float, altitude_deg: float) -> Vec3:
-    """Returns the unit vector of an azimuth clockwise from the local y axis and an altitude."""
-    azimuth, altitude = math.radians(azimuth_deg), math.radians(altitude_deg)
-    return (math.sin(azimuth) * math.cos(altitude), math.cos(azimuth) * math.cos(altitude), math.sin(altitude))
+def direction(azimuth_deg: float, elevation_deg: float) -> Vec3:
+    """Returns the unit vector of an azimuth clockwise from the local y axis and an elevation."""
+    azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
+    return (math.sin(azimuth) * math.cos(elevation), math.cos(azimuth) * math.cos(elevation), math.sin(elevation))
 
 
 DEFAULT_LIGHT: Final = PictureLight(direction(215.0, 48.0))

@@ -2,7 +2,7 @@ import { adoptStyles, element } from "../core/dom";
 import { selectTranslation } from "../core/i18n";
 import { sub, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
-import { MapLayer, Marker, UsageError, type Map3D, type Relief } from "../map3d";
+import { MapLayer, Marker, UsageError, type Map3D, type VisibleDepths } from "../map3d";
 import { groupPoints, spiderOffsets, type MarkerGroup } from "./groups";
 import { STYLES } from "./styles";
 
@@ -101,7 +101,7 @@ export class Cluster extends MapLayer<Map3D, ClusterEvents> {
   }
 
   readonly #update = (): void => {
-    const [map, relief] = [this.map, this.map?.relief];
+    const [map, relief] = [this.map, this.map?.visibleDepths];
     if (!map || !relief) return;
     this.#updateView(relief);
     if (this.#spread && Math.abs(map.zoom - this.#spread.zoom) > 1e-6) this.#join();
@@ -123,7 +123,7 @@ export class Cluster extends MapLayer<Map3D, ClusterEvents> {
   };
 
   /** Recomputes the positions of the markers in U and V when the view changes. */
-  #updateView({ camera, origin }: Relief): void {
+  #updateView({ camera, origin }: VisibleDepths): void {
     const view = [camera.frame.id, ...origin].join(" ");
     if (view === this.#view) return;
     this.#clear();
@@ -133,7 +133,7 @@ export class Cluster extends MapLayer<Map3D, ClusterEvents> {
     this.#markers.forEach((one, k) => this.#uv.set(uvdFromLocal(camera.frame.axes, sub(positionOf(one), origin)).slice(0, 2), 2 * k));
   }
 
-  #groupsAt(relief: Relief, level: number): MarkerGroup[] {
+  #groupsAt(relief: VisibleDepths, level: number): MarkerGroup[] {
     const groups = this.#groups.get(level) ?? groupPoints(this.#uv, this.options.radius_px * metresAt(relief, level));
     this.#groups.set(level, groups);
     return groups;
@@ -172,7 +172,7 @@ export class Cluster extends MapLayer<Map3D, ClusterEvents> {
 
   /** Zooms to the first level that separates the group, or spreads it. */
   #expand(map: Map3D, key: string, group: MarkerGroup, position: Vec3): void {
-    const relief = map.relief;
+    const relief = map.visibleDepths;
     if (!relief) return;
     const [, greatest] = map.zoomLimits;
     const uv = new Float64Array(group.members.flatMap((member) => [...this.#uv.subarray(2 * member, 2 * member + 2)]));
@@ -246,4 +246,4 @@ function checkMarkers(markers: readonly Marker[]): readonly Marker[] {
 }
 
 /** Metres per CSS pixel at a zoom level. */
-const metresAt = ({ pixel_m, level }: Relief, zoom: number): number => pixel_m * 2 ** (level - zoom);
+const metresAt = ({ pixel_m, level }: VisibleDepths, zoom: number): number => pixel_m * 2 ** (level - zoom);

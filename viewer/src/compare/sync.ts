@@ -138,9 +138,9 @@ export class Sync extends Evented<SyncEvents> {
 function findDirection(each: Map3D, leader: Map3D, turn_deg: number): string | null {
   const from = leader.directions.find(({ id }) => id === leader.direction);
   if (!from) return null;
-  const apart = (deg: number): number => Math.abs(((((deg - from.lookAtDeg - turn_deg) % 360) + 540) % 360) - 180);
+  const apart = (deg: number): number => Math.abs(((((deg - from.lookAt_deg - turn_deg) % 360) + 540) % 360) - 180);
   const [nearest] = [...each.directions].sort(
-    (a, b) => Math.abs(a.pitchDeg - from.pitchDeg) - Math.abs(b.pitchDeg - from.pitchDeg) || apart(a.lookAtDeg) - apart(b.lookAtDeg),
+    (a, b) => Math.abs(a.pitch_deg - from.pitch_deg) - Math.abs(b.pitch_deg - from.pitch_deg) || apart(a.lookAt_deg) - apart(b.lookAt_deg),
   );
   return nearest?.id ?? null;
 }

@@ -1,8 +1,8 @@
 /** map3d-controls: controls in the corners of the map, the user's location and an overview map. */
-import { features } from "../map3d";
+import { plugins } from "../map3d";
 import { addToCorner } from "./corners";
 
-features["controls"] = addToCorner;
+plugins["controls"] = addToCorner;
 export { Control, Control as control, type ControlOptions } from "./corners";
 export { Locate, Locate as locate, type Located, type LocateEvents, type LocateOptions } from "./locate";
 export { Overview, Overview as overview, type OverviewOptions } from "./overview";

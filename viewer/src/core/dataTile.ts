@@ -100,7 +100,7 @@ function paint(
   [codes, lengths, ids, normals, shapes, right, down, starts, readResidual, isDone]: Columns,
 ): DataTile {
   const values = kind === "normal" ? new Uint8Array(3 * width * height) : new Uint32Array(width * height);
-  // By label: the plane's depth at (0, 0), and the offset of the first pixel of the last run.
+  // For each label, the plane's depth at (0, 0) and the offset of the first pixel of the last run.
   const [zeros, offsets] = [ids.slice(), new Int32Array(labels)];
   let [run, begun, started, length] = [0, 0, 0, 0];
   // Ends and labels of the runs above.

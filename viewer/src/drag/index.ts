@@ -1,6 +1,6 @@
 /** map3d-drag: markers that can be dragged (`draggable`). Importing it is enough. */
-import { features } from "../map3d";
+import { plugins } from "../map3d";
 import { enableDragging } from "./drag";
 
-features["drag"] = enableDragging;
+plugins["drag"] = enableDragging;
 export { enableDragging };

@@ -20,10 +20,10 @@ export function place(element: Element, name: string): AnyPosition | undefined {
 /** Parses a number. @throws UsageError */
 export const number = (element: Element, name: string): number | undefined => numbers(element, name, 1, "a number")?.[0];
 
-/** Parses "azimuth altitude", degrees. @throws UsageError */
+/** Parses "azimuth elevation", degrees. @throws UsageError */
 export function light(element: Element): Partial<Light> | undefined {
-  const [azimuth_deg, altitude_deg] = numbers(element, "light", 2, 'azimuth and altitude in degrees, such as "215 48"') ?? [];
-  return azimuth_deg === undefined || altitude_deg === undefined ? undefined : { azimuth_deg, altitude_deg };
+  const [azimuth_deg, elevation_deg] = numbers(element, "light", 2, 'azimuth and elevation in degrees, such as "215 48"') ?? [];
+  return azimuth_deg === undefined || elevation_deg === undefined ? undefined : { azimuth_deg, elevation_deg };
 }
 
 /** Parses "now" or a time that `Date` understands, such as 2026-06-21T14:00Z. @throws UsageError */

@@ -18,7 +18,7 @@ export function embedCode(map: Map3D, { src, label }: EmbedOptions): string {
   const view = { direction: map.direction, center: center.map((part) => part.toFixed(1)).join(" "), zoom: map.zoom.toFixed(2) };
   const sun = time
     ? { time: time.toISOString().replace(/:\d\d\.\d+Z$/, "Z") }
-    : { light: `${light.azimuth_deg.toFixed(1)} ${light.altitude_deg.toFixed(1)}` };
+    : { light: `${light.azimuth_deg.toFixed(1)} ${light.elevation_deg.toFixed(1)}` };
   const attributes = Object.entries({ src: folder, ...(label !== undefined && { label }), ...view, ...sun });
   const tag = `<map-3d${attributes.map(([name, value]) => ` ${name}="${escape(value)}"`).join("")}></map-3d>`;
   return [tag, ...["map3d.js", "map3d-element.js"].map((file) => `<script src="${escape(`${folder}/${file}`)}"></script>`), ""].join("\n");

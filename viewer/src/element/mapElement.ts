@@ -1,6 +1,6 @@
 import {
-  features,
-  getFeature,
+  plugins,
+  getPlugin,
   Map3D,
   type Addable,
   type AnyPosition,
@@ -31,7 +31,7 @@ interface SavedState {
 }
 
 /** Attributes that add an entry of the same name to the map. */
-const FEATURES = ["orbit", "shade"];
+const PLUGINS = ["orbit", "shade"];
 /** An attribute that is an option of the map: how it is read, and how a change is applied; without that, a change creates a new map. */
 interface OptionAttribute<T> {
   /** @throws UsageError */
@@ -65,7 +65,7 @@ const OPTION_ROWS = Object.entries(OPTIONS) as [string, OptionAttribute<unknown>
 const RECREATING: ReadonlySet<string> = new Set([
   "src",
   "label",
-  ...FEATURES,
+  ...PLUGINS,
   ...OPTION_ROWS.flatMap(([name, { apply }]) => (apply ? [] : [name])),
 ]);
 /** Changes of these attributes are applied to the map. */
@@ -183,17 +183,17 @@ export class MapElement extends PageElement implements ElementHost {
     }
     for (const each of this.#parts("map-3d-layer")) each.enter(this);
     this.#updateContent();
-    this.#addFeatures();
+    this.#addPlugins();
   }
 
   /** Adds the entries that attributes ask for, as soon as their scripts have run. */
-  #addFeatures(): void {
-    for (const name of FEATURES.filter((each) => isOn(this, each) && !this.#added.has(each))) {
-      if (!(name in features) && document.readyState !== "complete") {
-        window.addEventListener("load", () => this.#addFeatures(), { once: true });
+  #addPlugins(): void {
+    for (const name of PLUGINS.filter((each) => isOn(this, each) && !this.#added.has(each))) {
+      if (!(name in plugins) && document.readyState !== "complete") {
+        window.addEventListener("load", () => this.#addPlugins(), { once: true });
         return;
       }
-      this.#try(() => this.#map?.add(new (getFeature(name, `<map-3d ${name}>`) as new () => Addable<Map3D>)()));
+      this.#try(() => this.#map?.add(new (getPlugin(name, `<map-3d ${name}>`) as new () => Addable<Map3D>)()));
       this.#added.add(name);
     }
   }
@@ -268,7 +268,7 @@ export class MapElement extends PageElement implements ElementHost {
     if (!sun) return;
     const [east, north, up] = sun.direction;
     if (sun.time !== null && rendering?.json.geographic) map.setTime(new Date(sun.time));
-    else map.setLight({ azimuth_deg: (Math.atan2(east, north) * 180) / Math.PI, altitude_deg: (Math.asin(up) * 180) / Math.PI });
+    else map.setLight({ azimuth_deg: (Math.atan2(east, north) * 180) / Math.PI, elevation_deg: (Math.asin(up) * 180) / Math.PI });
   }
 
   #try<T>(action: () => T): T | undefined {

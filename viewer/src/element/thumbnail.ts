@@ -20,7 +20,7 @@ export function showThumbnail(map: Map3D, layer: ImageLayer): void {
     const scale = 2 ** zoom; // CSS pixels of a pixel of level 0
     const px_m = map.metresPerPixel;
     const place = `${Number(left) * scale + (frame.u0 - u) / px_m + width / 2}px ${Number(top) * scale + (v - frame.v0) / px_m + height / 2}px/${Number(across) * scale}px ${Number(down) * scale}px`;
-    const isShown = webp && layer.mode === "lit" && layer.opacity === 1 && map.light.altitude_deg >= LOWEST_SUN_DEG;
+    const isShown = webp && layer.mode === "lit" && layer.opacity === 1 && map.light.elevation_deg >= LOWEST_SUN_DEG;
     style.background = isShown ? `url(data:image/webp;base64,${webp}) ${place} no-repeat,var(--map3d-background)` : "";
   };
   map.frameEvents.on("draw", update);

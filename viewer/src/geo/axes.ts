@@ -1,4 +1,4 @@
-import { dot, type Vec3 } from "../core/vec";
+import { dot, type Vec2, type Vec3 } from "../core/vec";
 
 /** The axes of a view in local coordinates: right, up, and forward (away from the viewer). Orthonormal. */
 export interface Axes {
@@ -10,7 +10,6 @@ export interface Axes {
 const EXACT: Record<number, Vec2> = { 0: [1, 0], 90: [0, 1], 180: [-1, 0], 270: [0, -1] };
 const HALF_SIN: Record<number, number> = { 30: 0.5, 150: 0.5, 210: -0.5, 330: -0.5 };
 const HALF_COS: Record<number, number> = { 60: 0.5, 300: 0.5, 120: -0.5, 240: -0.5 };
-type Vec2 = readonly [number, number];
 
 /** Returns cosine and sine of an angle; exact at multiples of 90° and where one of them is ±½. */
 export function cosSin(deg: number): Vec2 {
@@ -20,15 +19,15 @@ export function cosSin(deg: number): Vec2 {
 }
 
 /** Computes the axes of a view from its look-at angle (counter-clockwise from north) and pitch (below the horizon), in degrees. spec/pyramid.md §1. */
-export function computeAxes(lookAtDeg: number, pitchDeg: number): Axes {
-  const [ca, sa] = cosSin(lookAtDeg);
-  const [cp, sp] = cosSin(pitchDeg);
+export function computeAxes(lookAt_deg: number, pitch_deg: number): Axes {
+  const [ca, sa] = cosSin(lookAt_deg);
+  const [cp, sp] = cosSin(pitch_deg);
   return { right: [ca, sa, 0], up: [-sp * sa, sp * ca, cp], forward: [-cp * sa, cp * ca, -sp] };
 }
 
 /** Returns a view's id in its shortest decimal form, e.g. `45-22.5`. */
-export function viewId(lookAtDeg: number, pitchDeg: number): string {
-  return `${String(lookAtDeg)}-${String(pitchDeg)}`;
+export function viewId(lookAt_deg: number, pitch_deg: number): string {
+  return `${String(lookAt_deg)}-${String(pitch_deg)}`;
 }
 
 /** Transforms a local point to view coordinates U, V, D (metres). */

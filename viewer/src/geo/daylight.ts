@@ -7,33 +7,33 @@ import type { Light } from "./light";
 export function computeDaylight(
   time: Date,
   geographic: GeographicJson,
-): Pick<Light, "azimuth_deg" | "altitude_deg" | "sun_rgb" | "sky_rgb"> {
+): Pick<Light, "azimuth_deg" | "elevation_deg" | "sun_rgb" | "sky_rgb"> {
   const [lon, lat] = geographic.lon_lat;
-  const { azimuth, altitude } = getPosition(time, lat, lon);
-  return { azimuth_deg: localAzimuth(geographic, [lon, lat], azimuth), altitude_deg: altitude, ...computeSkyColors(altitude) };
+  const { azimuth, altitude: elevation_deg } = getPosition(time, lat, lon);
+  return { azimuth_deg: localAzimuth(geographic, [lon, lat], azimuth), elevation_deg, ...computeSkyColors(elevation_deg) };
 }
 
 /**
- * Computes the colours of sun and sky from the sun's altitude: white at noon, warm near the horizon, blue after sunset. The light left at night
+ * Computes the colours of sun and sky from the sun's elevation: white at noon, warm near the horizon, blue after sunset. The light left at night
  * keeps the town recognisable, as in a long exposure.
  */
-export function computeSkyColors(altitude_deg: number): { sun_rgb: Vec3; sky_rgb: Vec3 } {
+export function computeSkyColors(elevation_deg: number): { sun_rgb: Vec3; sky_rgb: Vec3 } {
   const at = (table: readonly ColorStop[]): Vec3 => {
-    const next = table.findIndex(([altitude]) => altitude >= altitude_deg);
+    const next = table.findIndex(([elevation]) => elevation >= elevation_deg);
     const [high, low] = [
       table[next < 0 ? table.length - 1 : next] as ColorStop,
       table[Math.max((next < 0 ? table.length : next) - 1, 0)] as ColorStop,
     ];
-    const share = high[0] === low[0] ? 0 : clamp((altitude_deg - low[0]) / (high[0] - low[0]), 0, 1);
+    const share = high[0] === low[0] ? 0 : clamp((elevation_deg - low[0]) / (high[0] - low[0]), 0, 1);
     return [0, 1, 2].map((k) => low[1][k as 0] + (high[1][k as 0] - low[1][k as 0]) * share) as unknown as Vec3;
   };
   return { sun_rgb: at(SUN), sky_rgb: at(SKY) };
 }
 
-type ColorStop = readonly [altitude_deg: number, rgb: Vec3];
+type ColorStop = readonly [elevation_deg: number, rgb: Vec3];
 
 const WHITE: Vec3 = [1, 1, 1];
-/** Factors of the diffuse light, by altitude. */
+/** Factors of the diffuse light, by elevation. */
 const SUN: readonly ColorStop[] = [
   [-1, [0, 0, 0]],
   [0.5, [0.42, 0.17, 0.06]],
@@ -41,7 +41,7 @@ const SUN: readonly ColorStop[] = [
   [12, [1.04, 0.88, 0.68]],
   [30, WHITE],
 ];
-/** Factors of the ambient light, by altitude. */
+/** Factors of the ambient light, by elevation. */
 const SKY: readonly ColorStop[] = [
   [-12, [0.44, 0.5, 0.7]],
   [-6, [0.48, 0.54, 0.72]],

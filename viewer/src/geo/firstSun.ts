@@ -1,6 +1,6 @@
 import type { LayerInfo, SunJson } from "./manifest";
 
-/** Sine of the sun's altitude in a first picture: shadows are long there, but streets are not dark. */
+/** Sine of the sun's elevation in a first picture: shadows are long there, but streets are not dark. */
 const HEIGHT = 0.5;
 
 /** Finds the rendered sun for a first picture: that of a single sun, else the first of the day that is 30° high, else the highest; undefined without suns. */

@@ -11,8 +11,8 @@ export interface Tile {
 /** The pinned square of a view, which its tiles divide. Metres, local frame of the rendering. */
 export interface Frame {
   readonly id: string;
-  readonly lookAtDeg: number;
-  readonly pitchDeg: number;
+  readonly lookAt_deg: number;
+  readonly pitch_deg: number;
   readonly axes: Axes;
   readonly u0: number;
   readonly v0: number;
@@ -34,8 +34,8 @@ export interface FrameJson {
 
 export function makeFrame(view: FrameJson, size: number, tilePx: number, zmax: number): Frame {
   const axes = computeAxes(view.look_at_deg, view.pitch_deg);
-  const { id, look_at_deg: lookAtDeg, pitch_deg: pitchDeg, u0_m: u0, v0_m: v0, d0_m: d0 } = view;
-  return { id, lookAtDeg, pitchDeg, axes, u0, v0, d0, size, tilePx, zmax };
+  const { id, look_at_deg: lookAt_deg, pitch_deg: pitch_deg, u0_m: u0, v0_m: v0, d0_m: d0 } = view;
+  return { id, lookAt_deg, pitch_deg, axes, u0, v0, d0, size, tilePx, zmax };
 }
 
 /** Metres per pixel at level z (which may be fractional). */

@@ -8,7 +8,7 @@ export interface Light {
   /** Azimuth of the light source, degrees clockwise from north. */
   azimuth_deg: number;
   /** Degrees above the horizon. */
-  altitude_deg: number;
+  elevation_deg: number;
   /** Ambient light, 0..1. */
   ambient: number;
   /** Light on a surface that faces the sun, added to ambient; linear. */
@@ -26,7 +26,7 @@ export interface Light {
 export const DEFAULT_LIGHT: Readonly<Light> = {
   lit: true,
   azimuth_deg: 215,
-  altitude_deg: 48,
+  elevation_deg: 48,
   ambient: 0.42,
   diffuse: 0.76,
   sun_rgb: [1, 1, 1],
@@ -36,20 +36,20 @@ export const DEFAULT_LIGHT: Readonly<Light> = {
 };
 
 /** Unit vector towards the light, local axes. */
-export function towardsLight({ azimuth_deg, altitude_deg }: Pick<Light, "azimuth_deg" | "altitude_deg">): Vec3 {
-  const [azimuth, altitude] = [(azimuth_deg * Math.PI) / 180, (altitude_deg * Math.PI) / 180];
-  return [Math.sin(azimuth) * Math.cos(altitude), Math.cos(azimuth) * Math.cos(altitude), Math.sin(altitude)];
+export function towardsLight({ azimuth_deg, elevation_deg }: Pick<Light, "azimuth_deg" | "elevation_deg">): Vec3 {
+  const [azimuth, elevation] = [(azimuth_deg * Math.PI) / 180, (elevation_deg * Math.PI) / 180];
+  return [Math.sin(azimuth) * Math.cos(elevation), Math.cos(azimuth) * Math.cos(elevation), Math.sin(elevation)];
 }
 
 /** Clamps a light's numbers to their ranges. @throws UsageError for unknown names, and for anything but finite numbers */
 export function clampLight(light: Light): Light {
   checkOptions(light, Object.keys(DEFAULT_LIGHT));
-  for (const name of ["azimuth_deg", "altitude_deg", "ambient", "diffuse"] as const) checkVector([light[name]], name, "a number", 1);
+  for (const name of ["azimuth_deg", "elevation_deg", "ambient", "diffuse"] as const) checkVector([light[name]], name, "a number", 1);
   for (const name of ["sun_rgb", "sky_rgb"] as const) checkVector(light[name], name, "three numbers");
   return {
     lit: light.lit,
     azimuth_deg: ((light.azimuth_deg % 360) + 360) % 360,
-    altitude_deg: clamp(light.altitude_deg, -90, 90),
+    elevation_deg: clamp(light.elevation_deg, -90, 90),
     ambient: clamp(light.ambient, 0, 1),
     diffuse: clamp(light.diffuse, 0, 4),
     sun_rgb: light.sun_rgb.map((part) => clamp(part, 0, 4)) as unknown as Vec3,

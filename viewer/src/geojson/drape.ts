@@ -1,5 +1,5 @@
 import type { Vec3 } from "../core/vec";
-import type { Relief } from "../map3d";
+import type { VisibleDepths } from "../map3d";
 
 /** A point this far above a surface counts as on it, in pixels and metres, so that lines along a wall stay on one edge of it. */
 const ON_PX = 1.5;
@@ -12,7 +12,7 @@ const MAX_SLOPE = 8;
  * Steps down the vertical, pixel by pixel. A continuous crossing of the visible surface is the answer; a jump of the surface in front of the vertical means that
  * the point is hidden.
  */
-export function drapedHeight(relief: Relief, x: number, y: number): number | null {
+export function drapedHeight(relief: VisibleDepths, x: number, y: number): number | null {
   const { axes, v0 } = relief.camera.frame;
   const { right, up, forward } = axes;
   const px = relief.pixel_m;
@@ -45,7 +45,13 @@ const fromAbove = (depth: number, d: number, forward: number): number | null =>
 const crosses = (before: number, above: number, jump: number): boolean => above <= 0 && before > 0 && before - above <= jump;
 
 /** Returns the height at which a point slightly above the surface, or on an edge, touches it. */
-function refineContact(relief: Relief, { u, v, d }: { u: number; v: number; d: number }, j: number, above: number, jump: number): number {
+function refineContact(
+  relief: VisibleDepths,
+  { u, v, d }: { u: number; v: number; d: number },
+  j: number,
+  above: number,
+  jump: number,
+): number {
   const {
     axes: { up, forward },
     v0,

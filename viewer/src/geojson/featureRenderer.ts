@@ -1,6 +1,6 @@
 import { element } from "../core/dom";
 import type { Vec2 } from "../core/vec";
-import type { Relief } from "../map3d";
+import type { VisibleDepths } from "../map3d";
 import { fillTile, overlaps, type PolygonFill } from "./fills";
 import { OPACITY_BEHIND, same, within, type FeatureLine, type Occlusion, type PlacedFeature } from "./placedFeature";
 import type { UvRect, LineSection } from "./lineSections";
@@ -34,8 +34,8 @@ export class FeatureRenderer {
   #region: UvRect | null = null;
   #level = NaN;
   #sources: readonly unknown[] = [];
-  #drawnCamera: Relief["camera"] | null = null;
-  #stale: { update(relief: Relief, region: UvRect, occlusion: Occlusion): void }[] = [];
+  #drawnCamera: VisibleDepths["camera"] | null = null;
+  #stale: { update(relief: VisibleDepths, region: UvRect, occlusion: Occlusion): void }[] = [];
   #missing: string[] = [];
 
   set(placed: readonly PlacedFeature[]): void {
@@ -58,7 +58,7 @@ export class FeatureRenderer {
   }
 
   /** Draws a frame. @returns true when all results are computed */
-  frame(relief: Relief): boolean {
+  frame(relief: VisibleDepths): boolean {
     const view = screenRect(relief);
     this.#updateView(relief);
     const region = this.#findWork(relief, view);
@@ -75,7 +75,7 @@ export class FeatureRenderer {
   }
 
   /** Discards all results when the view or the height range changes. */
-  #updateView(relief: Relief): void {
+  #updateView(relief: VisibleDepths): void {
     const viewKey = [relief.camera.frame.id, ...relief.heights, ...relief.origin].join(" ");
     if (viewKey === this.#viewKey) return;
     this.#viewKey = viewKey;
@@ -85,7 +85,7 @@ export class FeatureRenderer {
   }
 
   /** Lists the work required after a change. @returns the region to compute */
-  #findWork(relief: Relief, view: UvRect): UvRect {
+  #findWork(relief: VisibleDepths, view: UvRect): UvRect {
     const current =
       this.#region && relief.level === this.#level && within(view, this.#region) && same(this.#sources, relief.sources(this.#region));
     if (current && this.#region) return this.#region;
@@ -100,7 +100,7 @@ export class FeatureRenderer {
     return region;
   }
 
-  #fill(relief: Relief, key: string): void {
+  #fill(relief: VisibleDepths, key: string): void {
     const { tilePx } = relief.camera.frame;
     const rect = rectOf(relief, key);
     const rgba = fillTile(relief, [rect[0][0], rect[1][1]], tilePx, this.#fills);
@@ -110,12 +110,12 @@ export class FeatureRenderer {
   }
 
   /** Drops tiles that are far away or of another level. */
-  #evict(relief: Relief, region: UvRect): void {
+  #evict(relief: VisibleDepths, region: UvRect): void {
     const near = withMargin(region);
     for (const [key, { rect, level }] of this.#tiles) if (level !== relief.level || !overlaps(rect, near)) this.#tiles.delete(key);
   }
 
-  #draw(relief: Relief, view: UvRect): void {
+  #draw(relief: VisibleDepths, view: UvRect): void {
     const { camera, dpr } = relief;
     const [width, height] = [Math.max(1, Math.round(camera.width * dpr)), Math.max(1, Math.round(camera.height * dpr))];
     if (this.canvas.width !== width || this.canvas.height !== height) [this.canvas.width, this.canvas.height] = [width, height];
@@ -131,7 +131,7 @@ export class FeatureRenderer {
     for (const placed of this.#placed) this.#drawDots(context, placed, at, dpr);
   }
 
-  #drawTiles(context: CanvasRenderingContext2D, relief: Relief, view: UvRect, at: (u: number, v: number) => Vec2): void {
+  #drawTiles(context: CanvasRenderingContext2D, relief: VisibleDepths, view: UvRect, at: (u: number, v: number) => Vec2): void {
     if (this.#fills.length === 0) return;
     context.imageSmoothingEnabled = false;
     const toScreen = ([low, high]: UvRect): [number, number, number, number] => {
@@ -224,7 +224,7 @@ function pathOf(sections: readonly LineSection[], at: (u: number, v: number) => 
 }
 
 /** Returns the rectangle in U and V that the screen shows. */
-export function screenRect({ camera, pixel_m, level }: Relief): UvRect {
+export function screenRect({ camera, pixel_m, level }: VisibleDepths): UvRect {
   const px = (pixel_m * 2 ** level) / 2 ** camera.zoom;
   const [w, h] = [(camera.width / 2) * px, (camera.height / 2) * px];
   return [
@@ -242,7 +242,7 @@ function withMargin([low, high]: UvRect): UvRect {
 }
 
 /** Keys of the tiles that overlap a rectangle; the tile grid extends beyond the frame. */
-function tilesIn({ camera: { frame }, pixel_m, level }: Relief, [low, high]: UvRect): string[] {
+function tilesIn({ camera: { frame }, pixel_m, level }: VisibleDepths, [low, high]: UvRect): string[] {
   const side = frame.tilePx * pixel_m;
   const keys: string[] = [];
   for (let y = Math.floor((frame.v0 - high[1]) / side); y < (frame.v0 - low[1]) / side; y++) {
@@ -252,7 +252,7 @@ function tilesIn({ camera: { frame }, pixel_m, level }: Relief, [low, high]: UvR
   return keys;
 }
 
-function rectOf({ camera: { frame }, pixel_m }: Relief, key: string): UvRect {
+function rectOf({ camera: { frame }, pixel_m }: VisibleDepths, key: string): UvRect {
   const [, x = 0, y = 0] = key.split("/").map(Number);
   const side = frame.tilePx * pixel_m;
   return [

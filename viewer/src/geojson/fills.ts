@@ -1,6 +1,6 @@
 import type { Vec2, Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
-import type { Relief } from "../map3d";
+import type { VisibleDepths } from "../map3d";
 import { PolygonIndex } from "./polygonIndex";
 import type { UvRect } from "./lineSections";
 
@@ -19,14 +19,14 @@ export interface PolygonCover {
 }
 
 /** Returns null for a polygon that is seen edge-on. */
-export const coverOf = (polygon: Polygon, relief: Relief): PolygonCover | null =>
+export const coverOf = (polygon: Polygon, relief: VisibleDepths): PolygonCover | null =>
   polygon.draped ? drapedCover(polygon, relief) : planeCover(polygon, relief);
 
 /** Offset of the surface along the line of sight, so that filling a building's outline fills its walls, too. */
 const BEHIND_M = 0.05;
 
 /** Covers the surface whose horizontal position is inside the polygon, walls included. */
-function drapedCover({ rings }: Polygon, { camera, heights }: Relief): PolygonCover {
+function drapedCover({ rings }: Polygon, { camera, heights }: VisibleDepths): PolygonCover {
   const { right, up, forward } = camera.frame.axes;
   const area = new PolygonIndex(rings.map((ring) => ring.map(([x, y]): Vec2 => [x, y])));
   const corners = [area.low, area.high].flatMap(([x]) =>
@@ -42,7 +42,7 @@ function drapedCover({ rings }: Polygon, { camera, heights }: Relief): PolygonCo
 }
 
 /** Covers the plane through the outer ring, at its own height. */
-function planeCover({ rings }: Polygon, relief: Relief): PolygonCover | null {
+function planeCover({ rings }: Polygon, relief: VisibleDepths): PolygonCover | null {
   const flat = rings.map((ring) => ring.map((point) => uvdFromLocal(relief.camera.frame.axes, point)));
   const outer = flat[0] ?? [];
   const first = outer[0];
@@ -88,7 +88,7 @@ export interface PolygonFill {
 
 /** Returns the straight (not premultiplied) RGBA of a square tile with its top left corner at U and V; null for an empty tile. */
 export function fillTile(
-  relief: Relief,
+  relief: VisibleDepths,
   [left, top]: Vec2,
   side_px: number,
   fills: readonly PolygonFill[],

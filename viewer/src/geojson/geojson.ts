@@ -1,6 +1,6 @@
 import { adoptStyles } from "../core/dom";
 import { add, type Box3, type Vec2, type Vec3 } from "../core/vec";
-import { MapLayer, FetchError, UsageError, type Map3D, type Marker, type Relief } from "../map3d";
+import { MapLayer, FetchError, UsageError, type Map3D, type Marker, type VisibleDepths } from "../map3d";
 import { FeatureRenderer } from "./featureRenderer";
 import { anchorOf, hitTest } from "./hitTest";
 import { FeatureList } from "./featureList";
@@ -137,15 +137,15 @@ export class GeoJSON extends MapLayer<Map3D, GeojsonEvents> {
     const data = typeof this.#data === "string" ? await fetchJson(this.#data, signal) : this.#data;
     const { crs = "lonlat", filter } = this.options;
     const { shapes, skipped } = readGeojson(data, crs === "lonlat");
-    if (!map.relief) await new Promise<void>((ready) => map.once("ready", () => ready()));
-    const { relief } = map;
-    if (signal.aborted || !relief) return;
-    this.#addFeatures(map, relief, filter ? shapes.filter(({ feature }) => filter(feature)) : shapes, crs);
+    if (!map.visibleDepths) await new Promise<void>((ready) => map.once("ready", () => ready()));
+    const { visibleDepths } = map;
+    if (signal.aborted || !visibleDepths) return;
+    this.#addFeatures(map, visibleDepths, filter ? shapes.filter(({ feature }) => filter(feature)) : shapes, crs);
     this.fire("ready", { features: this.features, skipped });
     map.layerContext?.requestFrame();
   }
 
-  #addFeatures(map: Map3D, relief: Relief, shapes: readonly FeatureShape[], crs: "lonlat" | "scene"): void {
+  #addFeatures(map: Map3D, relief: VisibleDepths, shapes: readonly FeatureShape[], crs: "lonlat" | "scene"): void {
     const transform = coordinateTransform(map, relief.origin, crs);
     const { height, pointToMarker, onEachFeature, interactive, name = nameOf } = this.options;
     this.#origin = relief.origin;
@@ -156,7 +156,7 @@ export class GeoJSON extends MapLayer<Map3D, GeojsonEvents> {
     const messages = getGeojsonMessages(map.language);
     const numbers = new Map(this.#placed.map((placed, k) => [placed, k + 1]));
     if (interactive !== false) {
-      const press = (placed: PlacedFeature): void => this.#fire("click", placed, anchorOf(placed, map.relief ?? relief) ?? [0, 0]);
+      const press = (placed: PlacedFeature): void => this.#fire("click", placed, anchorOf(placed, map.visibleDepths ?? relief) ?? [0, 0]);
       this.#list = new FeatureList(
         messages.features,
         (placed) => name(placed.feature) || messages.feature(String(numbers.get(placed) ?? 0)),
@@ -169,7 +169,7 @@ export class GeoJSON extends MapLayer<Map3D, GeojsonEvents> {
   }
 
   /** Replaces dots of a feature with markers. */
-  #addMarkers(map: Map3D, relief: Relief, placed: PlacedFeature, make: NonNullable<GeojsonOptions["pointToMarker"]>): PlacedFeature {
+  #addMarkers(map: Map3D, relief: VisibleDepths, placed: PlacedFeature, make: NonNullable<GeojsonOptions["pointToMarker"]>): PlacedFeature {
     const dots = placed.dots.filter((dot) => {
       const marker = make(placed.feature, worldOf(this.#origin, dot.position, relief.heights[0]));
       if (marker) this.#markers.push({ marker, dot, height: NaN });
@@ -187,7 +187,7 @@ export class GeoJSON extends MapLayer<Map3D, GeojsonEvents> {
 
   readonly #draw = (): void => {
     const { map } = this;
-    const relief = map?.relief;
+    const relief = map?.visibleDepths;
     if (!relief || this.#placed.length === 0) return;
     // The results are in U and V of the next view, so they do not fit the frames of a transition.
     this.#renderer.canvas.style.visibility = map.inTransition ? "hidden" : "";
@@ -200,7 +200,7 @@ export class GeoJSON extends MapLayer<Map3D, GeojsonEvents> {
   };
 
   /** Moves markers of points without a height to the surface as soon as it is visible. */
-  #landMarkers(relief: Relief): void {
+  #landMarkers(relief: VisibleDepths): void {
     for (const entry of this.#markers) {
       const { marker, dot } = entry;
       if (!dot.draped || !dot.updateHeight(relief) || dot.position[2] === entry.height) continue;
@@ -224,7 +224,7 @@ export class GeoJSON extends MapLayer<Map3D, GeojsonEvents> {
   };
 
   readonly #updateList = (): void => {
-    const relief = this.map?.relief;
+    const relief = this.map?.visibleDepths;
     if (!relief) return;
     this.#list?.show(
       this.#placed.flatMap((placed) => {
@@ -245,7 +245,7 @@ export class GeoJSON extends MapLayer<Map3D, GeojsonEvents> {
   }
 
   #featureAt(point: Vec2): PlacedFeature | null {
-    const relief = this.map?.relief;
+    const relief = this.map?.visibleDepths;
     return relief ? hitTest(this.#placed, relief, point, this.#renderer.occlusion) : null;
   }
 
@@ -274,7 +274,7 @@ function nameOf({ id, properties }: Feature): string {
   return String(name ?? "").slice(0, 120);
 }
 
-function boundsOf(placed: readonly PlacedFeature[], { origin, heights }: Relief): Box3 | null {
+function boundsOf(placed: readonly PlacedFeature[], { origin, heights }: VisibleDepths): Box3 | null {
   const [low, high]: [number[], number[]] = [
     [Infinity, Infinity, Infinity],
     [-Infinity, -Infinity, -Infinity],

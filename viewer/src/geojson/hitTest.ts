@@ -1,5 +1,5 @@
 import type { Vec2 } from "../core/vec";
-import type { Relief } from "../map3d";
+import type { VisibleDepths } from "../map3d";
 import { screenRect } from "./featureRenderer";
 import type { FeatureLine, Occlusion, PlacedFeature } from "./placedFeature";
 
@@ -7,7 +7,7 @@ import type { FeatureLine, Occlusion, PlacedFeature } from "./placedFeature";
 const TOLERANCE_PX = 6;
 
 /** Returns the topmost feature at a point of the screen (CSS pixels): dots before lines before polygons. */
-export function hitTest(placed: readonly PlacedFeature[], relief: Relief, [x, y]: Vec2, occlusion: Occlusion): PlacedFeature | null {
+export function hitTest(placed: readonly PlacedFeature[], relief: VisibleDepths, [x, y]: Vec2, occlusion: Occlusion): PlacedFeature | null {
   const [low, high] = screenRect(relief);
   const px = (high[0] - low[0]) / relief.camera.width;
   const at: Vec2 = [low[0] + x * px, high[1] - y * px];
@@ -45,7 +45,7 @@ function distance(u: number, v: number, u0: number, v0: number, u1: number, v1: 
 }
 
 /** Returns a point of the screen (CSS pixels) for the label of a feature: a dot, or the middle of its visible lines; null when the feature is not in view. */
-export function anchorOf({ dots, lines }: PlacedFeature, relief: Relief): Vec2 | null {
+export function anchorOf({ dots, lines }: PlacedFeature, relief: VisibleDepths): Vec2 | null {
   const [low, high] = screenRect(relief);
   const px = (high[0] - low[0]) / relief.camera.width;
   const visible: Vec2[] = [];

@@ -1,6 +1,6 @@
 import type { Vec2, Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
-import type { Relief } from "../map3d";
+import type { VisibleDepths } from "../map3d";
 import { fillHeights, drapedHeight } from "./drape";
 
 /** [[least U, least V], [greatest U, greatest V]], metres. */
@@ -21,7 +21,7 @@ export interface LineSection {
 }
 
 /** Splits the part of a line in a rectangle into visible and hidden sections, in order. @param occluded false treats the whole line as visible */
-export function sectionsOf(path: Path, relief: Relief, rect: UvRect, occluded: boolean): LineSection[] {
+export function sectionsOf(path: Path, relief: VisibleDepths, rect: UvRect, occluded: boolean): LineSection[] {
   const sections = new SectionBuilder(relief, occluded);
   const { axes } = relief.camera.frame;
   for (const part of path.draped ? drapedParts(path.points, relief, rect) : [path.points]) {
@@ -56,11 +56,11 @@ const BEND_PX = 0.02;
 
 class SectionBuilder {
   readonly all: LineSection[] = [];
-  readonly #relief: Relief;
+  readonly #relief: VisibleDepths;
   readonly #occluded: boolean;
   #end: Vec2 | null = null;
 
-  constructor(relief: Relief, occluded: boolean) {
+  constructor(relief: VisibleDepths, occluded: boolean) {
     [this.#relief, this.#occluded] = [relief, occluded];
   }
 
@@ -105,7 +105,7 @@ function append(uv: number[], u: number, v: number, bend: number): void {
 }
 
 /** Returns the parts of a draped line that can be in a rectangle, sampled once per pixel, with heights. */
-function drapedParts(points: readonly Vec3[], relief: Relief, [low, high]: UvRect): Vec3[][] {
+function drapedParts(points: readonly Vec3[], relief: VisibleDepths, [low, high]: UvRect): Vec3[][] {
   const { axes } = relief.camera.frame;
   const [lowest, highest] = relief.heights;
   const reach: UvRect = [
@@ -136,7 +136,7 @@ function drapedParts(points: readonly Vec3[], relief: Relief, [low, high]: UvRec
 }
 
 /** Sets the heights of positions from the surface. @returns false when none is known */
-function setHeights(points: Vec3[], relief: Relief): boolean {
+function setHeights(points: Vec3[], relief: VisibleDepths): boolean {
   const heights = points.map(([x, y]) => drapedHeight(relief, x, y));
   points.forEach(([x, y], k) => (points[k] = [x, y, heights[k] ?? NaN]));
   if (!fillHeights(points)) points.forEach(([x, y], k) => (points[k] = [x, y, relief.heights[0]]));

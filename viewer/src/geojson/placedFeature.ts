@@ -1,6 +1,6 @@
 import type { Vec2, Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
-import type { Relief } from "../map3d";
+import type { VisibleDepths } from "../map3d";
 import { drapedHeight } from "./drape";
 import { boxOf, coverOf, overlaps, type PolygonCover, type PolygonFill, type Polygon } from "./fills";
 import { sectionsOf, type Path, type UvRect, type LineSection } from "./lineSections";
@@ -69,7 +69,7 @@ abstract class CachedGeometry {
   #sources: readonly unknown[] = [];
 
   /** Sets a new view and discards the results. */
-  setView(relief: Relief): void {
+  setView(relief: VisibleDepths): void {
     this.box = this.boxIn(relief);
     this.invalidate();
   }
@@ -80,7 +80,7 @@ abstract class CachedGeometry {
   }
 
   /** Is a part of it in a view stale? */
-  isStale(relief: Relief, view: UvRect): boolean {
+  isStale(relief: VisibleDepths, view: UvRect): boolean {
     const part = this.#part(relief, view);
     if (!part) return false;
     return (
@@ -89,7 +89,7 @@ abstract class CachedGeometry {
   }
 
   /** Computes the part in a region. */
-  update(relief: Relief, region: UvRect, occlusion: Occlusion): void {
+  update(relief: VisibleDepths, region: UvRect, occlusion: Occlusion): void {
     const part = this.#part(relief, region);
     if (!part) return;
     [this.#level, this.#region, this.#sources] = [relief.level, part, relief.sources(part)];
@@ -97,7 +97,7 @@ abstract class CachedGeometry {
   }
 
   /** The part of the extent in a view, with a margin of some pixels, since the surface is sampled at pixels. */
-  #part({ pixel_m }: Relief, view: UvRect): UvRect | null {
+  #part({ pixel_m }: VisibleDepths, view: UvRect): UvRect | null {
     const [[u0, v0], [u1, v1]] = this.box ?? [
       [Infinity, Infinity],
       [-Infinity, -Infinity],
@@ -112,8 +112,8 @@ abstract class CachedGeometry {
     );
   }
 
-  protected abstract boxIn(relief: Relief): UvRect;
-  protected abstract compute(relief: Relief, region: UvRect, occlusion: Occlusion): void;
+  protected abstract boxIn(relief: VisibleDepths): UvRect;
+  protected abstract compute(relief: VisibleDepths, region: UvRect, occlusion: Occlusion): void;
 }
 
 export class FeatureLine extends CachedGeometry {
@@ -129,16 +129,16 @@ export class FeatureLine extends CachedGeometry {
     return this.box;
   }
 
-  override setView(relief: Relief): void {
+  override setView(relief: VisibleDepths): void {
     super.setView(relief);
     this.sections = [];
   }
 
-  protected boxIn(relief: Relief): UvRect {
+  protected boxIn(relief: VisibleDepths): UvRect {
     return boxIn(this.path.points, this.path.draped, relief);
   }
 
-  protected compute(relief: Relief, region: UvRect, occlusion: Occlusion): void {
+  protected compute(relief: VisibleDepths, region: UvRect, occlusion: Occlusion): void {
     this.sections = sectionsOf(this.path, relief, region, occlusion !== "none");
   }
 }
@@ -157,13 +157,13 @@ export class FeatureDot extends CachedGeometry {
     [this.position, this.draped] = [position, draped];
   }
 
-  protected boxIn(relief: Relief): UvRect {
+  protected boxIn(relief: VisibleDepths): UvRect {
     this.at = null;
     return boxIn([this.position], this.draped, relief);
   }
 
   /** Updates the height from the surface. @returns false while the height is not known */
-  updateHeight(relief: Relief): boolean {
+  updateHeight(relief: VisibleDepths): boolean {
     const all: UvRect = [
       [-Infinity, -Infinity],
       [Infinity, Infinity],
@@ -174,7 +174,7 @@ export class FeatureDot extends CachedGeometry {
   }
 
   /** Keeps the last visible height while the point is hidden. */
-  protected compute(relief: Relief, _: UvRect, occlusion: Occlusion): void {
+  protected compute(relief: VisibleDepths, _: UvRect, occlusion: Occlusion): void {
     const [x, y, z] = this.position;
     const height = this.draped ? drapedHeight(relief, x, y) : z;
     if (height === null && Number.isNaN(this.#height)) return;
@@ -194,7 +194,7 @@ export class FeaturePolygon {
     this.#polygon = polygon;
   }
 
-  setView(relief: Relief): void {
+  setView(relief: VisibleDepths): void {
     this.#cover = coverOf(this.#polygon, relief);
   }
 
@@ -203,7 +203,7 @@ export class FeaturePolygon {
   }
 
   /** Is the polygon visible at U and V? */
-  covers(relief: Relief, [u, v]: Vec2, occlusion: Occlusion): boolean {
+  covers(relief: VisibleDepths, [u, v]: Vec2, occlusion: Occlusion): boolean {
     const depth = relief.depthAt(u, v);
     if (this.#polygon.draped && !Number.isFinite(depth)) return false;
     const covered = this.#cover?.at(u, v, depth) ?? 0;
@@ -211,7 +211,7 @@ export class FeaturePolygon {
   }
 }
 
-function boxIn(points: readonly Vec3[], draped: boolean, { camera, heights }: Relief): UvRect {
+function boxIn(points: readonly Vec3[], draped: boolean, { camera, heights }: VisibleDepths): UvRect {
   const { axes } = camera.frame;
   return boxOf(points.flatMap(([x, y, z]) => (draped ? heights : [z]).map((height) => uvdFromLocal(axes, [x, y, height]))));
 }

@@ -11,7 +11,7 @@ export interface LabelledFeature {
   readonly properties?: Readonly<Record<string, unknown>> | null;
 }
 
-type Coordinate = readonly [number, number, number?];
+type FeatureCoordinate = readonly [number, number, number?];
 type Transform = (lonLat: Vec2) => Vec2 | null;
 
 /** Makes a label of each feature that has a name: at a point, in the middle of a line, in the middle of a polygon. Larger features come first. @throws UsageError for anything but GeoJSON */
@@ -35,7 +35,7 @@ export function labelFeatures(data: unknown, name: (feature: LabelledFeature) =>
 export const nameOf = ({ properties }: LabelledFeature): string => properName(properties?.["name"]);
 
 interface Place {
-  readonly at: readonly Coordinate[];
+  readonly at: readonly FeatureCoordinate[];
   /** Extent in degrees. */
   readonly size: number;
   readonly line: boolean;
@@ -46,7 +46,7 @@ function findPlace(geometry: LabelledFeature["geometry"]): Place | null {
   const list = (Array.isArray(coordinates) ? coordinates : []) as unknown[];
   const parts = type.startsWith("Multi") ? list : [list];
   const lines = parts
-    .map((part) => (type.endsWith("Point") ? [part] : type.endsWith("Polygon") ? (part as unknown[])[0] : part) as Coordinate[])
+    .map((part) => (type.endsWith("Point") ? [part] : type.endsWith("Polygon") ? (part as unknown[])[0] : part) as FeatureCoordinate[])
     .filter((line) => Array.isArray(line) && line.length > 0 && line.every(isCoordinate));
   const largest = [...lines].sort((a, b) => extent(b) - extent(a))[0];
   if (!largest || !/(Point|LineString|Polygon)$/.test(type)) return null;
@@ -60,7 +60,7 @@ function findPlace(geometry: LabelledFeature["geometry"]): Place | null {
 
 const isCoordinate = (value: unknown): boolean => Array.isArray(value) && Number.isFinite(value[0]) && Number.isFinite(value[1]);
 
-function extent(line: readonly Coordinate[]): number {
+function extent(line: readonly FeatureCoordinate[]): number {
   const side = (axis: 0 | 1): number => Math.max(...line.map((point) => point[axis])) - Math.min(...line.map((point) => point[axis]));
   return Math.hypot(side(0), side(1));
 }
@@ -69,28 +69,30 @@ function extent(line: readonly Coordinate[]): number {
 const ALONG = [0.5, 0.35, 0.65, 0.2, 0.8];
 
 /** Returns the point at a share of the length of a line. */
-function pointAt(line: readonly Coordinate[], share: number): Coordinate {
-  const steps = line.slice(1).map((point, k) => Math.hypot(point[0] - (line[k] as Coordinate)[0], point[1] - (line[k] as Coordinate)[1]));
+function pointAt(line: readonly FeatureCoordinate[], share: number): FeatureCoordinate {
+  const steps = line
+    .slice(1)
+    .map((point, k) => Math.hypot(point[0] - (line[k] as FeatureCoordinate)[0], point[1] - (line[k] as FeatureCoordinate)[1]));
   let left = steps.reduce((sum, step) => sum + step, 0) * share;
   for (const [k, step] of steps.entries()) {
-    const [from, to] = [line[k] as Coordinate, line[k + 1] as Coordinate];
+    const [from, to] = [line[k] as FeatureCoordinate, line[k + 1] as FeatureCoordinate];
     if (step > 0 && left <= step) return [from[0] + ((to[0] - from[0]) * left) / step, from[1] + ((to[1] - from[1]) * left) / step];
     left -= step;
   }
-  return line[0] as Coordinate;
+  return line[0] as FeatureCoordinate;
 }
 
 /** Returns the centre of gravity of a ring; that of its corners if it has no area. */
-function centroid(ring: readonly Coordinate[]): Coordinate {
-  const [x0, y0] = ring[0] as Coordinate;
+function centroid(ring: readonly FeatureCoordinate[]): FeatureCoordinate {
+  const [x0, y0] = ring[0] as FeatureCoordinate;
   let [area, x, y] = [0, 0, 0];
   ring.forEach((point, k) => {
-    const next = ring[(k + 1) % ring.length] as Coordinate;
+    const next = ring[(k + 1) % ring.length] as FeatureCoordinate;
     const [ax, ay, bx, by] = [point[0] - x0, point[1] - y0, next[0] - x0, next[1] - y0];
     const cross = ax * by - bx * ay;
     area += cross;
     x += (ax + bx) * cross;
     y += (ay + by) * cross;
   });
-  return Math.abs(area) > 1e-18 ? [x0 + x / (3 * area), y0 + y / (3 * area)] : (ring[0] as Coordinate);
+  return Math.abs(area) > 1e-18 ? [x0 + x / (3 * area), y0 + y / (3 * area)] : (ring[0] as FeatureCoordinate);
 }

@@ -3,7 +3,7 @@ import { asError } from "../core/errors";
 import { addPanelButton } from "../core/panelButton";
 import { sub, type Vec2, type Vec3 } from "../core/vec";
 import { uvdFromLocal } from "../geo/axes";
-import { findHeight, MapLayer, type ImageLayer, type Map3D, type ObjectInfo, type Relief } from "../map3d";
+import { findHeight, MapLayer, type ImageLayer, type Map3D, type ObjectInfo, type VisibleDepths } from "../map3d";
 import { labelFeatures, nameOf, type LabelledFeature } from "./fromGeoJson";
 import { nameOfObject, ObjectLabels } from "./fromLayer";
 import { getLabelsMessage } from "./i18n";
@@ -195,7 +195,7 @@ export class Labels extends MapLayer<Map3D, LabelsEvents> {
 
   /** Chooses the labels to show. @param again judges places again that are known from coarser tiles */
   #layOut(map: Map3D, again: boolean): void {
-    const relief = map.relief;
+    const relief = map.visibleDepths;
     if (!relief || map.inTransition) return;
     if (map.direction !== this.#direction) for (const each of this.#placed.values()) each.place = undefined;
     this.#direction = map.direction;
@@ -242,13 +242,13 @@ export class Labels extends MapLayer<Map3D, LabelsEvents> {
 const boxOf = ({ width, label, shown }: Placed, [x, y]: Vec2): LabelBox => ({ x, y, width, height: HEIGHT_PX, rank: label.rank, shown });
 
 /** Returns the first of several places where a label is visible; null: it is hidden; undefined: depths are not in memory yet. */
-function judgeAll(relief: Relief, positions: readonly Vec3[]): Vec3 | null | undefined {
+function judgeAll(relief: VisibleDepths, positions: readonly Vec3[]): Vec3 | null | undefined {
   const places = positions.map((position) => judge(relief, position));
   return places.find((place) => place) ?? (places.includes(undefined) ? undefined : null);
 }
 
 /** Returns where a label is visible; null: it is hidden; undefined: depths are not in memory yet. */
-function judge(relief: Relief, position: Vec3): Vec3 | null | undefined {
+function judge(relief: VisibleDepths, position: Vec3): Vec3 | null | undefined {
   const [x, y, z] = sub(position, relief.origin);
   if (Number.isNaN(z)) {
     const height = findHeight(relief, x, y);

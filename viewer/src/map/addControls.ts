@@ -1,5 +1,5 @@
 import type { AddToCorner, Corner } from "../core/corner";
-import { getFeature } from "../core/features";
+import { getPlugin } from "../core/plugins";
 import { createAttribution, type AttributedMap } from "../ui/attribution";
 import { createControls, type ControlledMap } from "../ui/controls";
 import { createScaleBar, type ScaledMap } from "../ui/scaleBar";
@@ -13,7 +13,7 @@ export function addControls(
   const { controls, attribution, scaleBar = controls !== false } = options;
   const add = (control: HTMLElement, corner: Corner | true): void => {
     if (corner === true) map.controlPane.append(control);
-    else (getFeature("controls", `"${corner}"`) as AddToCorner)(map.controlPane, control, corner);
+    else (getPlugin("controls", `"${corner}"`) as AddToCorner)(map.controlPane, control, corner);
   };
   if (controls) add(createControls(map), controls);
   if (scaleBar) add(createScaleBar(map), scaleBar);

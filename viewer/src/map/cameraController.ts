@@ -93,11 +93,11 @@ export abstract class CameraController extends Evented<MapEvents> {
 
   /** Look-at angle, degrees counter-clockwise from north. */
   get lookAt_deg(): number {
-    return this.camera?.frame.lookAtDeg ?? 0;
+    return this.camera?.frame.lookAt_deg ?? 0;
   }
 
   /** All views of the first layer. */
-  get directions(): readonly { id: string; lookAtDeg: number; pitchDeg: number }[] {
+  get directions(): readonly { id: string; lookAt_deg: number; pitch_deg: number }[] {
     return [...(this.reference?.views.values() ?? [])].map(({ frame }) => frame);
   }
 
@@ -187,9 +187,9 @@ export abstract class CameraController extends Evented<MapEvents> {
   }
 
   /**
-   * Switches to another view of the rendering; the point at the centre stays there, or another comes there. The current view stays until tiles of the other
-   * one cover the screen, if only coarsely ("directionchange" tells when), or until a call sets the position; if they cannot be fetched, it remains and "error"
-   * tells why. @param center world position at the centre afterwards  @throws UsageError for an unknown view
+   * Switches to another view of the rendering; keeps the point at the centre, or centres `center`. The current view stays until tiles of the other one cover
+   * the screen, if only coarsely ("directionchange" tells when), or until a call sets the position; if they cannot be fetched, it remains and "error"
+   * tells why. @param center world position  @throws UsageError for an unknown view
    */
   setDirection(direction: string, center: Vec3 | null = null): this {
     if (center) checkVector(center, "setDirection");

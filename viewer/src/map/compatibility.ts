@@ -2,8 +2,8 @@ import type { Frame } from "../geo/frame";
 import type { ManifestJson, Rendering, View } from "../geo/manifest";
 
 /** Finds the view of a rendering with the look-at angle and pitch of a frame, whatever its id. */
-export function findMatchingView(rendering: Rendering, { lookAtDeg, pitchDeg }: Frame): View | undefined {
-  return [...rendering.views.values()].find(({ frame }) => frame.lookAtDeg === lookAtDeg && frame.pitchDeg === pitchDeg);
+export function findMatchingView(rendering: Rendering, { lookAt_deg, pitch_deg }: Frame): View | undefined {
+  return [...rendering.views.values()].find(({ frame }) => frame.lookAt_deg === lookAt_deg && frame.pitch_deg === pitch_deg);
 }
 
 /** Explains why two renderings cannot share a map; null when they can. Origins, squares and resolutions may differ. */

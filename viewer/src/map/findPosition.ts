@@ -6,7 +6,7 @@ import type { Rendering } from "../geo/manifest";
 import { worldPosition } from "../geo/position";
 import type { ImageLayer } from "./imageLayer";
 import type { ViewState } from "./layerContext";
-import { Relief } from "./relief";
+import { VisibleDepths } from "./visibleDepths";
 
 /** Number of tiles that are read for one position. */
 const TILES = 8;
@@ -38,9 +38,9 @@ export async function findPosition(
 /** Returns the local height of the highest surface at x and y that a view shows, to a pixel; null where that is hidden or missing. */
 async function findSurface(layers: readonly ImageLayer[], view: ViewState, [x, y]: Vec3): Promise<number | null> {
   const { axes } = view.camera.frame;
-  const [lowest, highest] = new Relief(layers, view).heights;
+  const [lowest, highest] = new VisibleDepths(layers, view).heights;
   const [low, high] = [uvdFromLocal(axes, [x, y, lowest]), uvdFromLocal(axes, [x, y, highest])];
-  const { relief } = await Relief.fetch(
+  const { relief } = await VisibleDepths.fetch(
     layers,
     view,
     [
@@ -54,7 +54,7 @@ async function findSurface(layers: readonly ImageLayer[], view: ViewState, [x, y
 }
 
 /** @internal Returns the local height of the highest visible surface at x and y, to a pixel; null where it is hidden or missing, NaN where depths are not in memory. */
-export function findHeight(relief: Relief, x: number, y: number): number | null {
+export function findHeight(relief: VisibleDepths, x: number, y: number): number | null {
   const { axes } = relief.camera.frame;
   const [lowest, highest] = relief.heights;
   const step = relief.pixel_m;

@@ -1,5 +1,5 @@
 import { checkNumber } from "../core/check";
-import { getFeature } from "../core/features";
+import { getPlugin } from "../core/plugins";
 import { MapLayer } from "../core/mapLayer";
 import { fillOptions, option, optionOr, type FilledOptionsOf, type OptionsOf } from "../core/options";
 import { asError, UsageError } from "../core/errors";
@@ -118,7 +118,7 @@ export class ImageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   bindTooltip(content: TooltipContent | null): this {
     this.#unbindTooltip?.();
     this.#unbindTooltip =
-      content === null ? undefined : (getFeature("tooltip", "bindTooltip") as BindTooltip)(this, content, () => this.map?.overlayPane);
+      content === null ? undefined : (getPlugin("tooltip", "bindTooltip") as BindTooltip)(this, content, () => this.map?.overlayPane);
     return this.#redraw();
   }
 
@@ -418,7 +418,7 @@ export class ImageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
 
   /** Finds the rendered light that matches a light. */
   #findBakedLight({ layers, json }: Rendering, light: Readonly<Light>): BakedLight {
-    const shadow = light.shadows && light.altitude_deg > 0 ? findShadow(json.layers, towardsLight(light)) : null;
+    const shadow = light.shadows && light.elevation_deg > 0 ? findShadow(json.layers, towardsLight(light)) : null;
     return { shadow, occlusion: light.occlusion && layers.has("ao") };
   }
 

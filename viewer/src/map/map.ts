@@ -25,7 +25,7 @@ import { fillMapOptions, type FilledOptions, type MapOptions } from "./options";
 import { FrameRenderer, type PlanInput } from "./frameRenderer";
 import { EMPTY_PICK, pick, pickLoaded, type Pick } from "./picker";
 import { PointerEvents } from "./pointerEvents";
-import { Relief } from "./relief";
+import { VisibleDepths } from "./visibleDepths";
 import { findPosition } from "./findPosition";
 import type { ViewState, LayerContext } from "./layerContext";
 import { addControls } from "./addControls";
@@ -47,7 +47,7 @@ export class Map3D extends CameraController implements OverlayHost, LayerHost<Ma
   readonly #abort = new AbortController();
   #gestures: Gestures | undefined;
   #drawnCamera: Camera | undefined;
-  #relief: Relief | undefined;
+  #relief: VisibleDepths | undefined;
   #plans: readonly LayerPlan[] = [];
   /** @internal Estimates light that was not rendered. */
   lightEstimator: LightEstimator | null = null;
@@ -179,7 +179,7 @@ export class Map3D extends CameraController implements OverlayHost, LayerHost<Ma
     return this.#light.current;
   }
 
-  /** Changes properties of the light; clamps numbers to their ranges. Setting azimuth or altitude ends the light of `setTime`. */
+  /** Changes properties of the light; clamps numbers to their ranges. Setting azimuth or elevation ends the light of `setTime`. */
   setLight(light: Partial<Light>): this {
     this.#light.set(light);
     return this.#fireLight();
@@ -254,24 +254,24 @@ export class Map3D extends CameraController implements OverlayHost, LayerHost<Ma
   }
 
   isOccluded(world: Vec3): boolean {
-    return this.relief?.isPositionOccluded(world) ?? false;
+    return this.visibleDepths?.isPositionOccluded(world) ?? false;
   }
 
   findSurfaceAt(point: Vec2): Vec3 | null {
-    return this.relief?.positionAt(point) ?? null;
+    return this.visibleDepths?.positionAt(point) ?? null;
   }
 
   /** @internal Depths of the last picture, for items that need them; null before "ready". */
-  get relief(): Relief | null {
+  get visibleDepths(): VisibleDepths | null {
     const viewState = this.getViewState();
     if (this.#relief?.camera !== viewState?.camera) this.#relief = undefined;
-    this.#relief ??= viewState ? new Relief(this.layers, viewState) : undefined;
+    this.#relief ??= viewState ? new VisibleDepths(this.layers, viewState) : undefined;
     return this.#relief ?? null;
   }
 
   /** @internal Fetches the depths of a rectangle (U and V) from the deepest level where it has at most `maxTiles` tiles. @param ids reads object ids as well */
-  fetchRelief(viewState: ViewState, rect: Rect, maxTiles: number, ids = false): ReturnType<typeof Relief.fetch> {
-    return Relief.fetch(this.layers, viewState, rect, maxTiles, ids);
+  fetchDepths(viewState: ViewState, rect: Rect, maxTiles: number, ids = false): ReturnType<typeof VisibleDepths.fetch> {
+    return VisibleDepths.fetch(this.layers, viewState, rect, maxTiles, ids);
   }
 
   /** Size of the decoded tiles in memory, bytes. */

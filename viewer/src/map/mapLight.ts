@@ -14,9 +14,9 @@ export class MapLight {
     this.current = clampLight({ ...DEFAULT_LIGHT, ...light });
   }
 
-  /** Changes properties of the light; azimuth or altitude end the light of a time. */
+  /** Changes properties of the light; azimuth or elevation end the light of a time. */
   set(light: Partial<Light>): void {
-    if (light.azimuth_deg !== undefined || light.altitude_deg !== undefined) this.time = null;
+    if (light.azimuth_deg !== undefined || light.elevation_deg !== undefined) this.time = null;
     this.#update(light);
   }
 

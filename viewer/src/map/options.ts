@@ -34,7 +34,7 @@ export const MAP_OPTIONS = {
   cover: optionOr<boolean>(false),
   /** Id of the initial view, such as "45-22.5". Default: the manifest's first view. */
   direction: option<string>(),
-  /** Light at first; the parts that are left out are those of `DEFAULT_LIGHT`. Default: `{ lit: true, azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.76, sun_rgb: [1, 1, 1], sky_rgb: [1, 1, 1], shadows: true, occlusion: true }`, from the south-west. */
+  /** Light at first; the parts that are left out are those of `DEFAULT_LIGHT`. Default: `{ lit: true, azimuth_deg: 215, elevation_deg: 48, ambient: 0.42, diffuse: 0.76, sun_rgb: [1, 1, 1], sky_rgb: [1, 1, 1], shadows: true, occlusion: true }`, from the south-west. */
   light: option<Partial<Light>>(),
   /** CSS background behind the model. Default: the style sheet's, light or dark. */
   background: option<string>(),

@@ -46,7 +46,7 @@ export async function measureFace(map: Map3D, position: Vec3, { signal }: FaceOp
   const tile_m = size / last;
   const [x, y] = [Math.floor((u - u0) / tile_m), Math.floor((v0 - v) / tile_m)];
   for (let tiles: GridBounds = [x, y, x + 1, y + 1]; ;) {
-    const { relief, approximate } = await map.fetchRelief(
+    const { relief, approximate } = await map.fetchDepths(
       state,
       rectOf(tiles, u0, v0, tile_m),
       Math.max(MAX_TILES * (256 / tilePx) ** 2, 4),

@@ -18,7 +18,7 @@ export interface MeasureOptions {
 }
 
 /** A corner: a clicked position on the surface. */
-export interface Corner {
+export interface MeasureCorner {
   /** World coordinates. */
   readonly position: Vec3;
   /** Read above the deepest level. */
@@ -27,7 +27,7 @@ export interface Corner {
 
 export interface MeasureEvents {
   /** The corners have changed. */
-  change: { corners: readonly Corner[]; line: LineMeasure; area: AreaMeasure };
+  change: { corners: readonly MeasureCorner[]; line: LineMeasure; area: AreaMeasure };
   /** The face at the single corner is known; null when the surface there is not flat. */
   face: { face: Face | null };
   /** The heights along the line are known. */
@@ -43,7 +43,7 @@ export class Measure extends MapLayer<Map3D, MeasureEvents> {
   #messages = new MeasureMessages(undefined);
   readonly #overlay = new MeasureOverlay();
   readonly #chart = new ProfileChart((at) => this.#onCursorMove(at));
-  #corners: readonly Corner[] = [];
+  #corners: readonly MeasureCorner[] = [];
   #profile: Profile | null = null;
   #face: Face | null = null;
   #direction = "";
@@ -55,7 +55,7 @@ export class Measure extends MapLayer<Map3D, MeasureEvents> {
   }
 
   /** Corners in the order of clicks. */
-  get corners(): readonly Corner[] {
+  get corners(): readonly MeasureCorner[] {
     return this.#corners;
   }
 
@@ -97,7 +97,7 @@ export class Measure extends MapLayer<Map3D, MeasureEvents> {
   }
 
   /** Replaces all corners. */
-  setCorners(corners: readonly Corner[]): this {
+  setCorners(corners: readonly MeasureCorner[]): this {
     [this.#corners, this.#face] = [corners, null];
     this.#draw();
     void this.#read();

@@ -1,6 +1,6 @@
 import { add, clamp, dot, sub, type Vec2, type Vec3 } from "../core/vec";
 import type { Axes } from "../geo/axes";
-import type { Map3D, Relief } from "../map3d";
+import type { Map3D, VisibleDepths } from "../map3d";
 
 /** Heights of the visible surface along a line: the upper outline of a vertical section. */
 export interface Profile {
@@ -38,7 +38,7 @@ export async function measureProfile(
   const state = map.getViewState();
   if (!state || points.length < 2) return { distances_m, heights_m, approximate: false };
   const { axes } = state.camera.frame;
-  const span = map.relief?.heights ?? [0, 0];
+  const span = map.visibleDepths?.heights ?? [0, 0];
   const size = Math.ceil(places.length / PARTS);
   let approximate = false;
   for (let first = 0; first < places.length; first += size) {
@@ -51,7 +51,7 @@ export async function measureProfile(
       [minimum(corners, 0), minimum(corners, 1)],
       [-minimum(corners, 0, -1), -minimum(corners, 1, -1)],
     ] as const;
-    const found = await map.fetchRelief(state, rect, MAX_TILES);
+    const found = await map.fetchDepths(state, rect, MAX_TILES);
     approximate ||= found.approximate;
     part.forEach((position, k) => {
       heights_m[first + k] = heightAt(found.relief, axes, position, span) + state.origin[2];
@@ -79,7 +79,7 @@ export function samplePoints(points: readonly Vec3[], samples: number): { positi
  * column of pixels. From the top down, it meets the surface where the surface changes continuously from behind the vertical to in front of it.
  */
 export function heightAt(
-  relief: Pick<Relief, "depthAt" | "pixel_m">,
+  relief: Pick<VisibleDepths, "depthAt" | "pixel_m">,
   { right, up, forward }: Axes,
   position: Vec3,
   [low, high]: Vec2,

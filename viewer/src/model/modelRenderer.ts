@@ -222,9 +222,9 @@ export class ModelRenderer implements CustomLayer {
 
   /** Returns the nearest model under a point of the screen if it has a click listener and, as far as depths are known, no image hides it. */
   #hitTest(point: Vec2): { model: SceneModel; position: Vec3; hit: ThreeHit } | null {
-    const { relief, inTransition } = this.#map;
-    if (!relief || inTransition || ![...this.#models.values()].some(({ listening }) => listening)) return null;
-    const { camera, origin } = relief;
+    const { visibleDepths, inTransition } = this.#map;
+    if (!visibleDepths || inTransition || ![...this.#models.values()].some(({ listening }) => listening)) return null;
+    const { camera, origin } = visibleDepths;
     const { axes } = camera.frame;
     const [near] = depthRangeOf(this.#boxes(), camera.frame) ?? [0];
     const [u, v] = uvFromScreen(camera, point);
@@ -237,7 +237,7 @@ export class ModelRenderer implements CustomLayer {
     const local: Vec3 = [hit.point.x, hit.point.y, hit.point.z];
     const model = this.#modelOf(hit.object);
     const d = axes.forward[0] * local[0] + axes.forward[1] * local[1] + axes.forward[2] * local[2];
-    return model?.listening && !relief.isOccluded(u, v, d) ? { model, position: add(origin, local), hit } : null;
+    return model?.listening && !visibleDepths.isOccluded(u, v, d) ? { model, position: add(origin, local), hit } : null;
   }
 
   #modelOf(node: ThreeNode): SceneModel | undefined {

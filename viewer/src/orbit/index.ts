@@ -1,6 +1,6 @@
 /** map3d-orbit: animates changes of the view. */
-import { features } from "../map3d";
+import { plugins } from "../map3d";
 import { Orbit } from "./orbit";
 
-features["orbit"] = Orbit;
+plugins["orbit"] = Orbit;
 export { Orbit, Orbit as orbit, type OrbitOptions } from "./orbit";

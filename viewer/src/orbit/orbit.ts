@@ -51,7 +51,7 @@ const MAX_WAIT_MS = 2500;
 /** A gesture must exceed this angle to change the view. */
 const MIN_GESTURE_DEG = 3;
 
-const anglesOf = ({ lookAtDeg, pitchDeg }: Frame): ViewAngles => ({ lookAt: lookAtDeg, pitch: pitchDeg });
+const anglesOf = ({ lookAt_deg, pitch_deg }: Frame): ViewAngles => ({ lookAt: lookAt_deg, pitch: pitch_deg });
 /** Signed difference of two angles, −180 to 180. */
 const angleBetween = (from: number, to: number): number => ((((to - from + 180) % 360) + 360) % 360) - 180;
 const angularDistance = (a: ViewAngles, b: ViewAngles): number => Math.hypot(angleBetween(a.lookAt, b.lookAt), a.pitch - b.pitch);
@@ -107,7 +107,7 @@ export class Orbit extends MapLayer<Map3D, object> implements ViewTransition {
     this.#gesture.turned_deg += (rad * 180) / Math.PI;
     const lookAt = this.#gesture.base_deg + this.#gesture.turned_deg;
     const beyond = angleBetween(map.lookAt_deg, lookAt);
-    const back = this.#transition ? angleBetween(map.lookAt_deg, this.#transition.from.frame.lookAtDeg) : 0;
+    const back = this.#transition ? angleBetween(map.lookAt_deg, this.#transition.from.frame.lookAt_deg) : 0;
     const between = this.#transition && Math.sign(beyond) === Math.sign(back) && Math.abs(beyond) <= Math.abs(back);
     if (!between && !map.isTurning && Math.abs(beyond) > MIN_GESTURE_DEG) map.rotate(Math.sign(beyond));
     if (this.#transition) this.#transition.current = { ...this.#transition.current, lookAt };
@@ -123,7 +123,7 @@ export class Orbit extends MapLayer<Map3D, object> implements ViewTransition {
     if (!transition) return;
     const to = map.lookAt_deg;
     if (
-      Math.abs(angleBetween(transition.current.lookAt, transition.from.frame.lookAtDeg)) <
+      Math.abs(angleBetween(transition.current.lookAt, transition.from.frame.lookAt_deg)) <
       Math.abs(angleBetween(transition.current.lookAt, to))
     )
       map.setDirection(transition.from.frame.id);
@@ -214,7 +214,7 @@ function intermediateCamera(camera: Camera, { current, pivot }: Pick<TransitionS
   const [turnedU, turnedV] = uvdFromLocal(axes, pivot);
   return {
     ...camera,
-    frame: { ...camera.frame, axes, lookAtDeg: current.lookAt, pitchDeg: current.pitch },
+    frame: { ...camera.frame, axes, lookAt_deg: current.lookAt, pitch_deg: current.pitch },
     u: turnedU + camera.u - u,
     v: turnedV + camera.v - v,
   };
@@ -236,8 +236,8 @@ function renderRgbd(frame: TransitionFrame, warp: Warp, camera: Camera, other: F
 
 /** Size, CSS pixels, of the level ground that the screen has covered half-way to another frame. */
 function sweptSize({ frame, width, height }: Camera, other: Frame): Vec2 {
-  const half = (Math.abs(angleBetween(frame.lookAtDeg, other.lookAtDeg)) / 2) * (Math.PI / 180);
-  const flat = Math.max(0.3, Math.sin((frame.pitchDeg * Math.PI) / 180));
+  const half = (Math.abs(angleBetween(frame.lookAt_deg, other.lookAt_deg)) / 2) * (Math.PI / 180);
+  const flat = Math.max(0.3, Math.sin((frame.pitch_deg * Math.PI) / 180));
   const [along, across] = [Math.abs(Math.cos(half)), Math.abs(Math.sin(half))];
   return [
     MARGIN_FACTOR * Math.max(width, width * along + (height * across) / flat),

@@ -1,5 +1,5 @@
 import { element } from "../core/dom";
-import { getFeature } from "../core/features";
+import { getPlugin } from "../core/plugins";
 import { fillOptions, option, optionOr, type FilledOptionsOf, type OptionsOf } from "../core/options";
 import type { EnableDragging, OverlayHost } from "../core/overlayHost";
 import type { AnyPosition } from "../core/position";
@@ -50,7 +50,7 @@ export class Marker extends PositionedLayer<MarkerEvents> {
   constructor(label: string, position: AnyPosition, options: MarkerOptions = {}) {
     super(position);
     this.options = fillOptions(MARKER_OPTIONS, options);
-    if (this.options.draggable) getFeature("drag", "draggable");
+    if (this.options.draggable) getPlugin("drag", "draggable");
     this.needs = this.options.draggable || this.options.occlusion !== "none" ? ["depth"] : [];
     [this.#label, this.#place] = [label, position];
   }
@@ -154,7 +154,7 @@ export class Marker extends PositionedLayer<MarkerEvents> {
     if (color !== undefined) button.style.setProperty("--map3d-marker", color);
     button.addEventListener("click", () => this.#onClick());
     if (draggable)
-      (getFeature("drag", "draggable") as EnableDragging)(
+      (getPlugin("drag", "draggable") as EnableDragging)(
         button,
         map,
         () => this.position,

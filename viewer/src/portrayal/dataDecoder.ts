@@ -2,7 +2,7 @@ import workerCode from "worker:./decodeData.worker.ts";
 import { DecodeError, type TileData } from "../map3d";
 import type { DataRequest, DataResponse } from "./decodeData";
 
-interface PendingDecode {
+interface PendingImage {
   readonly resolve: (data: TileData) => void;
   readonly reject: (reason: Error) => void;
 }
@@ -12,7 +12,7 @@ const IDLE_MS = 2000;
 
 /** Decodes data images in a worker. A page's CSP must allow `worker-src blob:`. */
 export class DataDecoder {
-  readonly #pending = new Map<number, PendingDecode>();
+  readonly #pending = new Map<number, PendingImage>();
   #worker: Worker | undefined;
   #count = 0;
   #idleTimer: ReturnType<typeof setTimeout> | undefined;

@@ -23,12 +23,12 @@ const GROWTH = 1.05;
 const TARGET_M = 1000;
 
 /** Reads the id of a view: look-at angle (counter-clockwise from north) and pitch (below the horizon), degrees. @throws UsageError */
-export function parseViewId(id: string): readonly [lookAtDeg: number, pitchDeg: number] {
+export function parseViewId(id: string): readonly [lookAt_deg: number, pitch_deg: number] {
   const [, a, p] = /^(\d{1,3}(?:\.\d+)?)-(\d{1,2}(?:\.\d+)?)$/.exec(id) ?? [];
-  const [lookAtDeg, pitchDeg] = [Number(a), Number(p)];
-  if (!(lookAtDeg < 360) || !(pitchDeg > 0 && pitchDeg <= 90))
+  const [lookAt_deg, pitch_deg] = [Number(a), Number(p)];
+  if (!(lookAt_deg < 360) || !(pitch_deg > 0 && pitch_deg <= 90))
     throw new UsageError(`view "${id}": expected a look-at angle from 0 to 360 and a pitch from 0 to 90, such as "45-22.5"`);
-  return [lookAtDeg, pitchDeg];
+  return [lookAt_deg, pitch_deg];
 }
 
 /** Makes views whose square holds a local box from all directions: spec/pyramid.md §2. */
@@ -105,6 +105,6 @@ export function placeCamera(frame: Frame, tile: Tile, origin: Vec3, box: Box3): 
     up: frame.axes.up,
     half_m: side / 2,
     far_m: Math.ceil(deepest - frame.d0 + Math.hypot(...sub(box[1], box[0])) + ROOM_M),
-    straightDown: frame.pitchDeg === 90,
+    straightDown: frame.pitch_deg === 90,
   };
 }

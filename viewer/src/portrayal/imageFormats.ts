@@ -94,9 +94,9 @@ export function checkImageOptions({ colorFormat, colorQuality, sun }: PortrayalO
     throw new UsageError(`colorQuality: expected a whole number from 0 to 100, got ${String(colorQuality)}`);
   if (colorQuality !== undefined && !LOSSY.includes(mediaTypeOf(colorFormat ?? "")))
     throw new UsageError(`colorQuality: needs a lossy colorFormat, ${LOSSY.join(" or ")}, got ${colorFormat ?? "none"}`);
-  if (sun && !(sun.azimuth_deg >= 0 && sun.azimuth_deg <= 360 && sun.altitude_deg > 0 && sun.altitude_deg <= 90))
+  if (sun && !(sun.azimuth_deg >= 0 && sun.azimuth_deg <= 360 && sun.elevation_deg > 0 && sun.elevation_deg <= 90))
     throw new UsageError(
-      `sun: expected azimuth_deg from 0 to 360 and altitude_deg above 0 and up to 90, got ${String(sun.azimuth_deg)} and ${String(sun.altitude_deg)}`,
+      `sun: expected azimuth_deg from 0 to 360 and elevation_deg above 0 and up to 90, got ${String(sun.azimuth_deg)} and ${String(sun.elevation_deg)}`,
     );
 }
 
@@ -112,14 +112,7 @@ export function describeLayers(images: ReadonlyMap<LayerKind, RequestedImage>, s
       format,
       media_type: mediaType,
       ...(kind === "depth" && { unit_m: DEPTH_UNIT_M }),
-      ...(kind === "sun" && sun && { suns: [describeSun(sun)] }),
+      ...(kind === "sun" && sun && { suns: [{ time: null, ...sun, direction: towardsLight(sun) }] }),
     };
   });
 }
-
-const describeSun = (sun: SunDirection): NonNullable<LayerInfo["suns"]>[number] => ({
-  time: null,
-  azimuth_deg: sun.azimuth_deg,
-  elevation_deg: sun.altitude_deg,
-  direction: towardsLight(sun),
-});

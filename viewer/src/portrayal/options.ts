@@ -5,7 +5,7 @@ export interface SunDirection {
   /** Clockwise from grid north, 0 to 360. */
   readonly azimuth_deg: number;
   /** Above the horizon, above 0 and up to 90. */
-  readonly altitude_deg: number;
+  readonly elevation_deg: number;
 }
 
 /** Options of `portrayalSource`. */

@@ -15,7 +15,7 @@ export interface ViewTemplate {
   readonly side_px: number;
   /** Quality of colours, 0 to 100; undefined for the service's. */
   readonly colorQuality?: number | undefined;
-  /** Direction of the sun of the image layer SUN. */
+  /** Sun of the image layer SUN. */
   readonly sun?: SunDirection | undefined;
   /** null: the order of the standard. */
   readonly projection: readonly ProjectionParameter[] | null;
@@ -63,7 +63,7 @@ export function viewUrl(template: ViewTemplate, camera: TileCamera, images: read
     `layers=${list(layers)}`,
     ...(styles.length > 0 ? [`styles=${list(styles)}`] : []),
     ...(has("color") ? ["transparentBackground=true"] : []),
-    ...(sun && has("sun") ? [`sun=${formatNumber(sun.azimuth_deg)},${formatNumber(sun.altitude_deg)}`] : []),
+    ...(sun && has("sun") ? [`sun=${formatNumber(sun.azimuth_deg)},${formatNumber(sun.elevation_deg)}`] : []),
     `portrayals=${portrayal}${qualities}`,
   ];
   return withQuery(endpoint, parameters.join("&"));

@@ -1,6 +1,6 @@
 /** map3d-shade: screen-space shadows and ambient occlusion. */
-import { features } from "../map3d";
+import { plugins } from "../map3d";
 import { Shade } from "./shade";
 
-features["shade"] = Shade;
+plugins["shade"] = Shade;
 export { Shade, Shade as shade, type ShadeOptions } from "./shade";

@@ -124,7 +124,7 @@ export class ScreenSpaceLight implements LightEstimator {
   }
 }
 
-const hasShadows = ({ light }: FrameContent): boolean => light.shadows && light.altitude_deg > 0;
+const hasShadows = ({ light }: FrameContent): boolean => light.shadows && light.elevation_deg > 0;
 
 /** Whether a pass lacks rendered light that can be estimated. */
 function needsEstimate(frame: FrameContent, { mode, relief, bakedLight }: LayerPass): boolean {

@@ -46,6 +46,6 @@ function lacksBakedLight(layer: ImageLayer, light: Readonly<Light>): boolean {
     baked !== null &&
     layer.mode === "lit" &&
     light.lit &&
-    ((light.occlusion && !baked.occlusion) || (light.shadows && light.altitude_deg > 0 && !baked.shadow))
+    ((light.occlusion && !baked.occlusion) || (light.shadows && light.elevation_deg > 0 && !baked.shadow))
   );
 }

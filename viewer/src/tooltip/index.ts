@@ -1,6 +1,6 @@
 /** map3d-tooltip: `bindTooltip` of image layers. Importing it is enough. */
-import { features } from "../map3d";
+import { plugins } from "../map3d";
 import { bindTooltip } from "./tooltip";
 
-features["tooltip"] = bindTooltip;
+plugins["tooltip"] = bindTooltip;
 export { bindTooltip };

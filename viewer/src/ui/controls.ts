@@ -7,7 +7,7 @@ export interface ControlledMap {
   readonly zoomLimits: readonly [number, number];
   readonly lookAt_deg: number;
   readonly language: string;
-  readonly directions: readonly { id: string; lookAtDeg: number }[];
+  readonly directions: readonly { id: string; lookAt_deg: number }[];
   zoomIn(): unknown;
   zoomOut(): unknown;
   rotate(step: number): unknown;
@@ -70,7 +70,7 @@ function createRotateGroup(map: ControlledMap, messages: MapMessages): HTMLEleme
   left.addEventListener("click", () => map.rotate(1));
   right.addEventListener("click", () => map.rotate(-1));
   compass.addEventListener("click", () => {
-    const [northmost] = [...map.directions].sort((a, b) => angleFromNorth(a.lookAtDeg) - angleFromNorth(b.lookAtDeg));
+    const [northmost] = [...map.directions].sort((a, b) => angleFromNorth(a.lookAt_deg) - angleFromNorth(b.lookAt_deg));
     if (northmost) map.setDirection(northmost.id);
   });
   map.on("directionchange", () => {
@@ -94,6 +94,6 @@ function createCompass({ north }: MapMessages): HTMLButtonElement {
 }
 
 /** Returns the index of a look-at angle's wind among the eight winds, counter-clockwise from north. */
-export const computeWind = (lookAtDeg: number): number => Math.round((((lookAtDeg % 360) + 360) % 360) / 45) % 8;
+export const computeWind = (lookAt_deg: number): number => Math.round((((lookAt_deg % 360) + 360) % 360) / 45) % 8;
 
 const angleFromNorth = (deg: number): number => Math.min(deg, 360 - deg);

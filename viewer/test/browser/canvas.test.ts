@@ -99,7 +99,7 @@ describe("if a tile pixel is a device pixel, both drawers agree except for round
   test("with another light, and without light", async () => {
     const pages = await both("town");
     for (const light of [
-      { azimuth_deg: 20, altitude_deg: 10, ambient: 0.1, diffuse: 3 },
+      { azimuth_deg: 20, elevation_deg: 10, ambient: 0.1, diffuse: 3 },
       { azimuth_deg: 200, diffuse: 0 },
       { lit: false },
     ]) {
@@ -344,7 +344,7 @@ test("the old picture stays while new light is computed", async () => {
 });
 
 test("if pixels cannot be read exactly, compositing lights nearly the same", async () => {
-  const options = { zoom: 3, light: { azimuth_deg: 215, altitude_deg: 48, ambient: 0.42, diffuse: 0.9 } };
+  const options = { zoom: 3, light: { azimuth_deg: 215, elevation_deg: 48, ambient: 0.42, diffuse: 0.9 } };
   const { page: plain } = await bed.start("town", { ...options, drawer: "webgl" });
   const { page } = await bed.openPage();
   await page.addInitScript(() => {

@@ -36,7 +36,7 @@ test.each(["webgl", "canvas"])("%s: data tiles give the same pictures and picks 
     expect(packed?.equals(plain as Buffer)).toBe(true);
   };
   const light = (given: object): unknown => (globalThis as Global).map.setLight(given);
-  await compare(light, { azimuth_deg: 120, altitude_deg: 30 });
+  await compare(light, { azimuth_deg: 120, elevation_deg: 30 });
   await compare((ids: number[]) => (globalThis as Global).layer.highlight(ids), [17, 1025]);
   await compare((hidden: number[]) => (globalThis as Global).layer.setStyle({ hidden }), [2_000_000_001]);
   for (const mode of ["normal", "id", "depth", "lit"] as const)

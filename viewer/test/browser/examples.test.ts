@@ -98,7 +98,7 @@ const POINTS: Readonly<Record<string, (page: Page, picture: Buffer) => Promise<v
     expect(length).toBeLessThan(34.2);
   },
   sun: async (page, afternoon) => {
-    expect(await text(page, "output")).toMatch(/^15:00: sun at altitude \d+°/);
+    expect(await text(page, "output")).toMatch(/^15:00: sun at elevation \d+°/);
     await page.locator("#hour").fill("23");
     expect(await text(page, "output")).toBe("23:00: the sun has set");
     expect(afternoon.equals(await still(page))).toBe(false);

@@ -38,7 +38,7 @@ const bed = new TestBed({ town: renderTown(), plan: renderTown(128, 0.29, PLAN) 
 const NOW = new Date("2026-06-21T11:00:00Z");
 const STILL: BrowserContextOptions = { reducedMotion: "reduce", locale: "en-GB", timezoneId: "Europe/Berlin" };
 const WIDE = { viewport: { width: 480, height: 320 } };
-const LOW = { azimuth_deg: 250, altitude_deg: 12, sun_rgb: [1, 0.7, 0.45], sky_rgb: [0.6, 0.7, 1] };
+const LOW = { azimuth_deg: 250, elevation_deg: 12, sun_rgb: [1, 0.7, 0.45], sky_rgb: [0.6, 0.7, 1] };
 const [HALL, CHAPEL] = [17, 3_900_000_007];
 const places = { hall: [ORIGIN[0] - 45, ORIGIN[1] - 4, ORIGIN[2] + 34], tower: [ORIGIN[0] + 32, ORIGIN[1] + 26, ORIGIN[2] + 62] } as const;
 

@@ -39,9 +39,9 @@ export const placeOf = async (page: Page): Promise<[number, number]> => {
 export type Shares = readonly [sky: number, sun: number];
 
 /** Computes the cosine between a stored normal and the light; null without a normal. */
-export function cosine(stored: Uint8Array, { azimuth_deg, altitude_deg }: { azimuth_deg: number; altitude_deg: number }): number | null {
+export function cosine(stored: Uint8Array, { azimuth_deg, elevation_deg }: { azimuth_deg: number; elevation_deg: number }): number | null {
   if (stored.every((part) => part === 0)) return null;
-  const [a, h] = [(azimuth_deg * Math.PI) / 180, (altitude_deg * Math.PI) / 180];
+  const [a, h] = [(azimuth_deg * Math.PI) / 180, (elevation_deg * Math.PI) / 180];
   const n = [...stored].map((part) => (part / 255) * 2 - 1);
   const sun = [Math.sin(a) * Math.cos(h), Math.cos(a) * Math.cos(h), Math.sin(h)];
   return Math.max(0, n.reduce((sum, part, k) => sum + part * (sun[k] ?? 0), 0) / Math.hypot(...n));

@@ -12,7 +12,7 @@ const town = renderTown();
 const bed = new TestBed({ town: withBakedLight(town), plain: town });
 const undrawn = new TestBed(bed.server, { draws: false });
 
-const BETWEEN = { azimuth_deg: 110 + 0.3 * 25, altitude_deg: 35.6 };
+const BETWEEN = { azimuth_deg: 110 + 0.3 * 25, elevation_deg: 35.6 };
 /** Weight of DAY[2], computed by the map itself in a unit test; here to byte precision. */
 const bits =
   (share: number) =>
@@ -22,18 +22,18 @@ const bits =
   };
 const all = (): number => 1;
 type Share = (x: number, y: number) => number;
-type Row = [name: string, towards: { azimuth_deg: number; altitude_deg: number }, more: Partial<Light>, sky: Share, sun: Share];
+type Row = [name: string, towards: { azimuth_deg: number; elevation_deg: number }, more: Partial<Light>, sky: Share, sun: Share];
 const RGB: Partial<Light> = { sun_rgb: [1, 0.7, 0.4], sky_rgb: [0.5, 0.6, 1] };
 
 describe("rendered light dims lit pixels one by one", () => {
-  const noon = { azimuth_deg: NOON.azimuth_deg, altitude_deg: NOON.elevation_deg };
-  const hour = { azimuth_deg: DAY[1]?.azimuth_deg ?? 0, altitude_deg: DAY[1]?.elevation_deg ?? 0 };
+  const noon = { azimuth_deg: NOON.azimuth_deg, elevation_deg: NOON.elevation_deg };
+  const hour = { azimuth_deg: DAY[1]?.azimuth_deg ?? 0, elevation_deg: DAY[1]?.elevation_deg ?? 0 };
   const rows: Row[] = [
     ["the sun's own layer", noon, { occlusion: false }, all, (x: number, y: number) => PATTERN.sun(x, y) / 255],
     ["an hour of the day", hour, { occlusion: false }, all, bits(0)],
     ["occlusion alone", noon, { shadows: false }, (x: number, y: number) => PATTERN.ao(x, y) / 255, all],
     ["shadows and occlusion in colours", hour, RGB, (x: number, y: number) => PATTERN.ao(x, y) / 255, bits(0)],
-    ["no layer for another sun", { azimuth_deg: 300, altitude_deg: 30 }, { occlusion: false }, all, all],
+    ["no layer for another sun", { azimuth_deg: 300, elevation_deg: 30 }, { occlusion: false }, all, all],
   ];
   test.each(rows.flatMap((row) => (["webgl", "canvas"] as const).map((drawer) => [drawer, ...row] as const)))(
     "%s: %s",
@@ -86,7 +86,7 @@ test("tiles of light are requested only when shown, after colour and normals", a
   bed.server.requests.length = 0;
   const { page } = await undrawn.start("town", { light: { shadows: false, occlusion: false } });
   expect(bed.server.requests.filter((url) => /\/(noon|day|ao)\//.test(url))).toEqual([]);
-  await settled(page, (light) => (globalThis as Global).map.setLight(light), { shadows: true, azimuth_deg: 200, altitude_deg: 50 });
+  await settled(page, (light) => (globalThis as Global).map.setLight(light), { shadows: true, azimuth_deg: 200, elevation_deg: 50 });
   const asked = bed.server.requests.filter((url) => /\/(noon|day|ao)\//.test(url));
   expect(asked.length).toBeGreaterThan(0);
   expect(asked.every((url) => url.includes("/noon/"))).toBe(true);
@@ -100,7 +100,7 @@ test("setTime lights the scene by the sun; setting an azimuth ends it", async ()
     return [map.light, map.time?.toISOString()] as const;
   });
   expect(time).toBe("2026-06-21T11:15:00.000Z");
-  expect(noon.altitude_deg).toBeCloseTo(65.3, 1);
+  expect(noon.elevation_deg).toBeCloseTo(65.3, 1);
   expect(noon.azimuth_deg).toBeGreaterThan(176);
   expect(noon.azimuth_deg).toBeLessThan(180);
   const bright = await pixels(page);
@@ -134,7 +134,7 @@ test.each(["webgl", "canvas"])(
       bed.server.requests.length = 0;
       const { page, problems } = await bed.start(
         "town",
-        { zoom: deviceScaleFactor === 1 ? 3 : 2, light: { azimuth_deg: 110, altitude_deg: 33, shadows: false }, drawer },
+        { zoom: deviceScaleFactor === 1 ? 3 : 2, light: { azimuth_deg: 110, elevation_deg: 33, shadows: false }, drawer },
         {},
         { viewport: { width: 800 / deviceScaleFactor, height: 600 / deviceScaleFactor }, deviceScaleFactor },
       );

@@ -19,7 +19,7 @@ test("a box is visible exactly where it is nearer than the images, with equal br
   const evening: Light = {
     ...DEFAULT_LIGHT,
     azimuth_deg: 265,
-    altitude_deg: 20,
+    elevation_deg: 20,
     ambient: 0.3,
     diffuse: 0.9,
     sun_rgb: [1, 0.7, 0.4],

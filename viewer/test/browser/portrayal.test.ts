@@ -54,12 +54,12 @@ test.each(["webgl", "canvas"] as const)("the layer of a service equals that of t
 });
 
 test.each(["webgl", "canvas"] as const)("shadows and occlusion of a service equal those of the tiles (%s)", async (drawer) => {
-  const light = { azimuth_deg: NOON.azimuth_deg, altitude_deg: NOON.elevation_deg, ambient: 0.3, diffuse: 0.6 };
+  const light = { azimuth_deg: NOON.azimuth_deg, elevation_deg: NOON.elevation_deg, ambient: 0.3, diffuse: 0.6 };
   const seen = new Map<string, Buffer>();
   const { page: direct } = await litBed.start("town", { language: "en", drawer, light, preserveDrawingBuffer: true });
   seen.set("tiles", await pixels(direct));
   await direct.context().close();
-  const sun = { azimuth_deg: NOON.azimuth_deg, altitude_deg: NOON.elevation_deg };
+  const sun = { azimuth_deg: NOON.azimuth_deg, elevation_deg: NOON.elevation_deg };
   for (const [name, options] of Object.entries({ both: { sun, occlusion: true }, shadows: { sun }, neither: {} })) {
     litBed.server.requests.length = 0;
     const { page, problems } = await start(options, { drawer, light }, {}, litBed);
@@ -97,7 +97,7 @@ test.each<[string, Record<string, unknown>, string]>([
   ["an unknown rendering", { rendering: "x" }, 'the layer links to no rendering "x"; it links to town'],
   ["a format that the service lacks", { colorFormat: "image/webp" }, "the service has no COLOR images as image/webp; it has image/png"],
   ["occlusion that the service lacks", { occlusion: true }, "does not advertise the image layer AO; it has DEPTH, OBJECTID, NORMAL, COLOR"],
-  ["shadows that the service lacks", { sun: { azimuth_deg: 200, altitude_deg: 50 } }, "does not advertise the image layer SUN"],
+  ["shadows that the service lacks", { sun: { azimuth_deg: 200, elevation_deg: 50 } }, "does not advertise the image layer SUN"],
   ["too many styles", { styles: ["a", "b"] }, "styles: expected one per layer, got 2 for 1"],
   ["an invalid view", { views: ["400-45"] }, 'view "400-45": expected a look-at angle'],
 ])("the map names the error: %s", async (_, options, words) => {

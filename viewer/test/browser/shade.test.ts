@@ -16,7 +16,7 @@ const town = renderTown();
 const bed = new TestBed({ town, baked: withBakedLight(town) });
 const [WIDTH, HEIGHT] = [600, 480];
 /** Light from the left, so that shadows fall beside their casters; sunlight only, and skylight only. */
-const SUN = { azimuth_deg: 280, altitude_deg: 38, ambient: 0.1, diffuse: 0.9, occlusion: false };
+const SUN = { azimuth_deg: 280, elevation_deg: 38, ambient: 0.1, diffuse: 0.9, occlusion: false };
 const SKY = { ambient: 1, diffuse: 0, shadows: false };
 const OPTIONS = { center: [ORIGIN[0] - 5, ORIGIN[1], ORIGIN[2]], zoom: 3, direction: "0-45" };
 const VIEWPORT = { viewport: { width: WIDTH, height: HEIGHT } };
@@ -53,7 +53,7 @@ const pointOf = ({ d }: Hit, [u, v]: readonly [number, number]): Vec3 => localFr
 
 /** Whether the sun is visible from a point, past all boxes. */
 function seesSun(point: Vec3): boolean {
-  const axes = computeAxes((540 - SUN.azimuth_deg) % 360, SUN.altitude_deg);
+  const axes = computeAxes((540 - SUN.azimuth_deg) % 360, SUN.elevation_deg);
   const sunny: Frame = { ...frame, axes, d0: -2000 };
   const [u, v, d] = uvdFromLocal(axes, point);
   const first = trace(sunny, u, v);
@@ -61,7 +61,7 @@ function seesSun(point: Vec3): boolean {
 }
 
 test("estimated shadows match rays to the sun for all visible points", async () => {
-  expect(dot(computeAxes((540 - SUN.azimuth_deg) % 360, SUN.altitude_deg).forward, towardsLight(SUN))).toBeCloseTo(-1, 9);
+  expect(dot(computeAxes((540 - SUN.azimuth_deg) % 360, SUN.elevation_deg).forward, towardsLight(SUN))).toBeCloseTo(-1, 9);
   const { page, problems } = await start({ light: SUN });
   const bright = await picture(page);
   await settled(page, addShade, {});
@@ -215,7 +215,7 @@ test("an exported picture of several pieces has the shadows of the screen, at it
 });
 
 test.each([
-  ["rendered light suits", "baked", { light: { azimuth_deg: 200, altitude_deg: 50 } }],
+  ["rendered light suits", "baked", { light: { azimuth_deg: 200, elevation_deg: 50 } }],
   ["the canvas drawer draws", "town", { drawer: "canvas" }],
   ["nothing is lit", "town", { light: { lit: false } }],
 ] as const)("where %s nothing is found, and no depth fetched", async (_, rendering, options) => {

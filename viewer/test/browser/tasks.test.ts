@@ -372,7 +372,7 @@ test("see the shadow at 17:00", async () => {
   }
   expect(places.dark.length).toBeGreaterThan(20);
   expect(places.lit.length).toBeGreaterThan(200);
-  // Of the positions in shadow according to rays, the fraction that is darker than sunlit ground.
+  // Fraction of the positions in shadow, according to rays, that is darker than sunlit ground.
   await expect
     .poll(
       async () => {

@@ -108,7 +108,7 @@ test("without light, colours are shown exactly as stored", async () => {
 });
 
 test("each pixel is lit by Lambert's law in linear light, half by its own normal and an eighth by each neighbour's", async () => {
-  const light = { azimuth_deg: 200, altitude_deg: 30, ambient: 0.2, diffuse: 0.6 };
+  const light = { azimuth_deg: 200, elevation_deg: 30, ambient: 0.2, diffuse: 0.6 };
   const { page } = await started({ zoom: 3, light });
   const got = await pixels(page);
   const [color, normal] = [decodedLevel(town, "color"), decodedLevel(town, "normal")];

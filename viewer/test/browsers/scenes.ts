@@ -5,7 +5,7 @@ import { HEIGHT, WIDTH } from "./page";
 /** Actions on a map, one after another, each followed by a screenshot. */
 const scenes: readonly (readonly [name: string, act: (plan: string) => unknown])[] = [
   ["lit", () => (globalThis as Global).map.setLight({})],
-  ["low sun", () => (globalThis as Global).map.setLight({ azimuth_deg: 250, altitude_deg: 12, sun_rgb: [1, 0.7, 0.45] })],
+  ["low sun", () => (globalThis as Global).map.setLight({ azimuth_deg: 250, elevation_deg: 12, sun_rgb: [1, 0.7, 0.45] })],
   ["normal", () => (globalThis as Global).layer.setMode("normal")],
   ["id", () => (globalThis as Global).layer.setMode("id")],
   ["depth", () => (globalThis as Global).layer.setMode("depth")],

@@ -53,16 +53,16 @@ test.each(SUNS)("the sun over %d, %d at %s matches an almanac to a thirtieth of 
 
 test("daylight comes from the sun's azimuth in the grid, white at noon and blue at night", () => {
   const noon = computeDaylight(new Date("2026-06-21T11:15:00Z"), PLACE);
-  expect(noon.altitude_deg).toBeGreaterThan(64);
+  expect(noon.elevation_deg).toBeGreaterThan(64);
   expect(noon.sun_rgb).toEqual([1, 1, 1]);
   const night = computeDaylight(new Date("2026-06-21T23:00:00Z"), PLACE);
   expect(night.sun_rgb).toEqual([0, 0, 0]);
   expect(night.sky_rgb[2]).toBeGreaterThan(1.3 * night.sky_rgb[0]);
 });
 
-test("light increases with the sun's altitude, without jumps", () => {
-  for (let altitude = -20; altitude < 60; altitude += 0.1) {
-    const [low, high] = [computeSkyColors(altitude), computeSkyColors(altitude + 0.1)];
+test("light increases with the sun's elevation, without jumps", () => {
+  for (let elevation = -20; elevation < 60; elevation += 0.1) {
+    const [low, high] = [computeSkyColors(elevation), computeSkyColors(elevation + 0.1)];
     high.sky_rgb.forEach((part, k) => {
       expect(part - low.sky_rgb[k as 0]).toBeGreaterThanOrEqual(-1e-12);
       expect(part - low.sky_rgb[k as 0]).toBeLessThan(0.02);
@@ -78,11 +78,14 @@ test("clocks show the user's time zone near home and solar time elsewhere", () =
 });
 
 describe("shadows that match a light", () => {
-  const sun = (azimuth_deg: number, altitude_deg: number): { time: null; azimuth_deg: number; elevation_deg: number; direction: Vec3 } => ({
+  const sun = (
+    azimuth_deg: number,
+    elevation_deg: number,
+  ): { time: null; azimuth_deg: number; elevation_deg: number; direction: Vec3 } => ({
     time: null,
     azimuth_deg,
-    elevation_deg: altitude_deg,
-    direction: towardsLight({ azimuth_deg, altitude_deg }),
+    elevation_deg,
+    direction: towardsLight({ azimuth_deg, elevation_deg }),
   });
   const layer = (name: string, kind: string, suns: ReturnType<typeof sun>[]): LayerInfo => ({
     name,
@@ -93,8 +96,8 @@ describe("shadows that match a light", () => {
   });
   const hours = layer("day", "sun16", [sun(90, 20), sun(110, 32), sun(135, 42), sun(165, 48)]);
   const noon = layer("noon", "sun", [sun(200, 50)]);
-  const at = (azimuth_deg: number, altitude_deg: number): ReturnType<typeof findShadow> =>
-    findShadow([hours, noon, layer("color", "color", [])], towardsLight({ azimuth_deg, altitude_deg }));
+  const at = (azimuth_deg: number, elevation_deg: number): ReturnType<typeof findShadow> =>
+    findShadow([hours, noon, layer("color", "color", [])], towardsLight({ azimuth_deg, elevation_deg }));
 
   test("a single sun if it is the light's", () => {
     expect(at(200, 50)).toMatchObject({ layer: noon, first: 0, second: 0, share: 0 });

@@ -7,7 +7,7 @@ const view = (fields: object): Map3D =>
     center: [691015.04, 5336015, 520] as Vec3,
     direction: "0-45",
     zoom: 2.6,
-    light: { azimuth_deg: 215, altitude_deg: 48 },
+    light: { azimuth_deg: 215, elevation_deg: 48 },
     time: null,
     ...fields,
   }) as unknown as Map3D;

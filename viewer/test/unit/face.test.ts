@@ -54,7 +54,7 @@ const town =
 function mapOf(frame: Frame, surface: Surface = town(frame), asked: number[] = []): Map3D {
   return {
     getViewState: () => ({ camera: { frame }, origin: ORIGIN }),
-    fetchRelief: (_: unknown, [low, high]: readonly [Vec2, Vec2], most: number) => {
+    fetchDepths: (_: unknown, [low, high]: readonly [Vec2, Vec2], most: number) => {
       let z = frame.zmax;
       const tiles = (): number => (((high[0] - low[0]) * 2 ** z) / frame.size + 1) * (((high[1] - low[1]) * 2 ** z) / frame.size + 1);
       while (z > 0 && tiles() > most) z--;

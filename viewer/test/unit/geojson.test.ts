@@ -9,7 +9,7 @@ import { readGeojson } from "../../src/geojson/parse";
 import { coordinateTransform } from "../../src/geojson/coordinates";
 import { clipped, sectionsOf } from "../../src/geojson/lineSections";
 import type { ImageLayer } from "../../src/map/imageLayer";
-import { Relief } from "../../src/map/relief";
+import { VisibleDepths } from "../../src/map/visibleDepths";
 import { renderTown } from "../fixture/rendering";
 import { ORIGIN, trace } from "../fixture/town";
 
@@ -48,9 +48,9 @@ function layerOf({ opacity = 1, hidden, gone }: Made = {}): ImageLayer {
   } as unknown as ImageLayer;
 }
 
-function reliefOf(layers: readonly ImageLayer[], direction = "0-45"): Relief {
+function reliefOf(layers: readonly ImageLayer[], direction = "0-45"): VisibleDepths {
   const { frame } = rendering.views.get(direction) as View;
-  return new Relief(layers, { camera: { frame, u: 0, v: 0, zoom: 3, width: 800, height: 600 }, origin: ORIGIN, dpr: 1, finer: 0 });
+  return new VisibleDepths(layers, { camera: { frame, u: 0, v: 0, zoom: 3, width: 800, height: 600 }, origin: ORIGIN, dpr: 1, finer: 0 });
 }
 
 let state = 7;

@@ -170,7 +170,7 @@ describe("markers and layers", () => {
 test.each([
   [{ azimuth: 3 }, /unknown option "azimuth"; use lit, azimuth_deg/],
   [{ azimuth_deg: NaN }, /azimuth_deg: expected a number/],
-  [{ altitude_deg: "30" }, /altitude_deg: expected a number, got \["30"\]/],
+  [{ elevation_deg: "30" }, /elevation_deg: expected a number, got \["30"\]/],
   [{ sun_rgb: [1, 1] }, /sun_rgb: expected three numbers, got \[1,1\]/],
 ])("a light of %j is refused", (light, message) => {
   expect(() => clampLight({ ...DEFAULT_LIGHT, ...light } as typeof DEFAULT_LIGHT)).toThrow(message);

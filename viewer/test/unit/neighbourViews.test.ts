@@ -13,9 +13,9 @@ const VIEWS = [
   [0, 90],
 ] as const;
 const views = new Map(
-  VIEWS.map(([lookAtDeg, pitchDeg]) => [
-    `${String(lookAtDeg)}-${String(pitchDeg)}`,
-    { frame: { id: `${String(lookAtDeg)}-${String(pitchDeg)}`, lookAtDeg, pitchDeg } },
+  VIEWS.map(([lookAt_deg, pitch_deg]) => [
+    `${String(lookAt_deg)}-${String(pitch_deg)}`,
+    { frame: { id: `${String(lookAt_deg)}-${String(pitch_deg)}`, lookAt_deg, pitch_deg } },
   ]),
 );
 const rendering = { views } as unknown as Rendering;

@@ -208,8 +208,8 @@ test.each<[string, readonly RequestedImage[], Partial<ViewTemplate>, string, str
   ["a quality for each image", [NORMAL, WEBP], { colorQuality: 70 }, "", ";QUALITIES=100,70"],
   ["a quality of 0", [WEBP], { colorQuality: 0 }, "", ";QUALITIES=0"],
   ["a quality without colours", [NORMAL], { colorQuality: 70 }, "", ""],
-  ["a sun", [COLOR, SUN], { sun: { azimuth_deg: 359.5, altitude_deg: 0.25 } }, "&sun=359.5,0.25", ""],
-  ["a sun without its image", [COLOR, AO], { sun: { azimuth_deg: 1, altitude_deg: 2 } }, "", ""],
+  ["a sun", [COLOR, SUN], { sun: { azimuth_deg: 359.5, elevation_deg: 0.25 } }, "&sun=359.5,0.25", ""],
+  ["a sun without its image", [COLOR, AO], { sun: { azimuth_deg: 1, elevation_deg: 2 } }, "", ""],
 ])("GetView: %s", (_, images, template, sun, qualities) => {
   const url = viewUrl({ ...TEMPLATE, ...template }, CAMERA, images);
   expect(/&sun=[^&]*/.exec(url)?.[0] ?? "").toBe(sun);
@@ -298,7 +298,7 @@ const withSunParameter = (layers: Record<string, string[]>, ...parameters: strin
   ...offered(layers),
   operations: new Map([["GetView", { url: null, formats: [], parameters: new Set(parameters) }]]),
 });
-const sun = { azimuth_deg: 135, altitude_deg: 45 };
+const sun = { azimuth_deg: 135, elevation_deg: 45 };
 
 test("additional images are those that the options ask for", () => {
   const full = withSunParameter({ COLOR: ["image/png"], AO: ["image/jpeg", "image/png"], SUN: ["image/png"] }, "portrayals", "sun");
@@ -345,9 +345,9 @@ test.each<[PortrayalOptions, RegExp]>([
   [{ colorQuality: 50.5, colorFormat: "image/webp" }, /colorQuality: expected a whole number/],
   [{ colorQuality: 50 }, /colorQuality: needs a lossy colorFormat, image\/jpeg or image\/webp, got none/],
   [{ colorQuality: 50, colorFormat: "image/png" }, /got image\/png/],
-  [{ sun: { azimuth_deg: -1, altitude_deg: 45 } }, /sun: expected azimuth_deg from 0 to 360/],
-  [{ sun: { azimuth_deg: 0, altitude_deg: 0 } }, /altitude_deg above 0 and up to 90, got 0 and 0/],
-  [{ sun: { azimuth_deg: 0, altitude_deg: NaN } }, /got 0 and NaN/],
+  [{ sun: { azimuth_deg: -1, elevation_deg: 45 } }, /sun: expected azimuth_deg from 0 to 360/],
+  [{ sun: { azimuth_deg: 0, elevation_deg: 0 } }, /elevation_deg above 0 and up to 90, got 0 and 0/],
+  [{ sun: { azimuth_deg: 0, elevation_deg: NaN } }, /got 0 and NaN/],
 ])("options of images are checked: %j", (options, words) => {
   expect(() => {
     checkImageOptions(options);
@@ -359,7 +359,7 @@ test.each<PortrayalOptions>([
   { colorQuality: 0, colorFormat: "image/webp" },
   { colorQuality: 100, colorFormat: "Image/JPEG" },
   { colorQuality: 7, colorFormat: "image/jpg" },
-  { sun: { azimuth_deg: 360, altitude_deg: 90 }, occlusion: false },
+  { sun: { azimuth_deg: 360, elevation_deg: 90 }, occlusion: false },
 ])("valid options of images: %j", (options) => {
   expect(() => {
     checkImageOptions(options);

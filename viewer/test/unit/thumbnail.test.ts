@@ -51,7 +51,7 @@ function read(thumbnails: readonly unknown[]): Rendering {
 class Stand extends Evented<{ load: object }> {
   readonly container = { style: { background: "" } };
   readonly frameEvents = new Evented<{ draw: object }>();
-  readonly light = { altitude_deg: 48 };
+  readonly light = { elevation_deg: 48 };
   readonly layer: { rendering: Rendering | undefined; mode: string; opacity: number };
   camera: Camera;
 
@@ -140,13 +140,13 @@ describe("a thumbnail", () => {
     [
       "at night",
       ({ light }) => {
-        light.altitude_deg = -20;
+        light.elevation_deg = -20;
       },
     ],
     [
       "when the sun is low",
       ({ light }) => {
-        light.altitude_deg = 9;
+        light.elevation_deg = 9;
       },
     ],
     [

@@ -18,7 +18,7 @@ const MIN_BIAS_M = 0.05;
  * Depths of the visible surface, read from the tiles in memory for many points of one picture. U, V and D are metres in the camera's frame, from
  * the camera's origin. With several layers, the nearest surface counts; hidden objects and invisible layers do not.
  */
-export class Relief {
+export class VisibleDepths {
   readonly camera: Camera;
   readonly origin: Vec3;
   readonly dpr: number;
@@ -56,13 +56,13 @@ export class Relief {
     [low, high]: Rect,
     maxTiles: number,
     ids = false,
-  ): Promise<{ relief: Relief; approximate: boolean }> {
+  ): Promise<{ relief: VisibleDepths; approximate: boolean }> {
     const { frame } = viewState.camera;
     const across = (z: number): number =>
       (((high[0] - low[0]) * 2 ** z) / frame.size + 1) * (((high[1] - low[1]) * 2 ** z) / frame.size + 1);
     let zoom = frame.zmax;
     while (zoom > 0 && across(zoom) > maxTiles) zoom--;
-    const relief = new Relief(layers, { ...viewState, camera: { ...viewState.camera, zoom }, dpr: 1, finer: 0 }, ids);
+    const relief = new VisibleDepths(layers, { ...viewState, camera: { ...viewState.camera, zoom }, dpr: 1, finer: 0 }, ids);
     await Promise.allSettled(relief.#layers.flatMap((layer) => layer.fetch([low, high])));
     relief.#layers.forEach((layer) => layer.clearPatches());
     // Tiles may have failed, or have been dropped before the last one arrived.
