@@ -14,7 +14,7 @@ const dist = join(root, "dist");
 const INTERNAL_NAMES = `
   advanceCamera backoff_ms checkCompatible clearFailures clearPatches continueTurn copyToCanvas createName deselectMarkers dragBy dropTiles
   enterFullScreen exitFullScreen findCenterSurface findView fitCanvas forget freeAllBut fullScreen getOrCreate hasFailed initializeView isCombinable
-  hovers isCovered isLoaded isLoading isPositionOccluded lightLayers listViewsAhead loadError makePass makeRequest nextCamera nextView onLoadError onManifest onUploaded peek pinned placeElement positionAt
+  hovers isCovered isLoaded isLoading isPositionOccluded lightLayers listNeeds listViewsAhead loadError makePass makeRequest nextCamera nextView onLoadError onManifest onUploaded peek pinned placeElement positionAt
   probes prune releaseData replaceCanvas requiredKinds requireGpu resizeCamera retry_ms retryAfter_ms rotateLeft rotateRight runNow screenCenter setCamera setLimit
   setRequests showElement showsAt slots startInertia startTick transient transitionCamera uncovered urgency winds zoomToRect
 `
