@@ -9,6 +9,7 @@ export { findHeight } from "./map/findPosition";
 export { plugins, getPlugin } from "./core/plugins";
 export type { TooltipContent } from "./map/options";
 export type { Corner } from "./core/corner";
+export type { FilledOptionsOf, Option, OptionsOf } from "./core/options";
 export { MapLayer, type Addable, type LayerHost } from "./core/mapLayer";
 export { Evented, type FiredEvent, type Listener } from "./core/events";
 export { DecodeError, DrawError, FetchError, ManifestError, Map3dError, UsageError } from "./core/errors";

@@ -1,10 +1,7 @@
 import { checkOptions } from "./check";
 
-/** Checks a value. @throws UsageError */
-type Check<T> = (value: T, name: string) => unknown;
-
 /** A row of a table of options: the default, undefined for none, and the check. The documentation of the row is that of the option. */
-export type Option<T, Default = T | undefined> = readonly [byDefault: Default, check: Check<T> | undefined];
+export type Option<T, Default = T | undefined> = readonly [byDefault: Default, check: ((value: T, name: string) => unknown) | undefined];
 
 /** The type of the options of a table. */
 export type OptionsOf<Table> = { -readonly [K in keyof Table]?: Table[K] extends Option<infer T, unknown> ? T : never };
@@ -19,10 +16,10 @@ export type FilledOptionsOf<Table> = OptionsOf<Table> & {
 type OptionTable = Record<string, Option<never, unknown>>;
 
 /** Makes the row of an option without a fixed default. */
-export const option = <T>(check?: Check<T>): Option<T, undefined> => [undefined, check];
+export const option = <T>(check?: Option<T>[1]): Option<T, undefined> => [undefined, check];
 
 /** Makes the row of an option with a default. */
-export const optionOr = <T>(byDefault: T, check?: Check<T>): Option<T, T> => [byDefault, check];
+export const optionOr = <T>(byDefault: T, check?: Option<T>[1]): Option<T, T> => [byDefault, check];
 
 /** Returns options with their defaults. @throws UsageError for unknown and wrong options */
 export function fillOptions<Table extends OptionTable>(table: Table, options: OptionsOf<Table>): FilledOptionsOf<Table> {

@@ -35,8 +35,8 @@ const PLUGINS = ["orbit", "shade"];
 /** An attribute that is an option of the map: how it is read, and how a change is applied; without that, a change creates a new map. */
 interface OptionAttribute<T> {
   /** @throws UsageError */
-  read(element: Element): T | undefined;
-  apply?(map: Map3D, value: T): unknown;
+  readonly read: (element: Element) => T | undefined;
+  readonly apply?: (map: Map3D, value: T) => unknown;
 }
 
 type OptionAttributes = { readonly [K in keyof MapOptions]?: OptionAttribute<NonNullable<MapOptions[K]>> };

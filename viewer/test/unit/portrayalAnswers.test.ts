@@ -157,7 +157,7 @@ test.each<[string, () => Response]>([
   expect(asked).toEqual(["COLOR,NORMAL", "COLOR", "NORMAL", "COLOR", "NORMAL"]);
 });
 
-test("a service that has sent several images once is believed when it cannot", async () => {
+test("an error page of a service that has sent several images once is an error", async () => {
   let count = 0;
   const { views } = service((images) =>
     count++ === 0 ? packed(images) : new Response("oh", { headers: { "Content-Type": "text/html" } }),
