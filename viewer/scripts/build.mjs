@@ -12,11 +12,11 @@ const root = resolve(dirname(fileURLToPath(import.meta.url)), "..");
 const dist = join(root, "dist");
 /** Names of members that only the core uses, and no public type has: bundles have short ones in their place. `checkInternalNames` fails where another file uses one. */
 const INTERNAL_NAMES = `
-  advanceCamera backoff_ms checkCompatible clearFailures clearPatches continueTurn copyToCanvas createName deselectMarkers dragBy dropTiles
+  advanceCamera ahead attempts backoff_ms checkCompatible clearFailures clearPatches continueTurn copyToCanvas createName customLayers deselectMarkers dragBy dropTiles
   enterFullScreen exitFullScreen findCenterSurface findView fitCanvas forget freeAllBut fullScreen getOrCreate hasFailed initializeView isCombinable
-  hovers isCovered isLoaded isLoading isPositionOccluded lightLayers listNeeds listViewsAhead loadError makePass makeRequest nextCamera nextView onLoadError onManifest onUploaded peek pinned placeElement positionAt
+  hovers inputs isCovered isLoaded isLoading isPositionOccluded lightLayers listNeeds listViewsAhead loadError makePass makeRequest nextCamera nextView onLoadError onManifest onUploaded packed peek pinned placeElement positionAt
   probes prune releaseData replaceCanvas requiredKinds requireGpu resizeCamera retry_ms retryAfter_ms rotateLeft rotateRight runNow screenCenter setCamera setLimit
-  setRequests showElement showsAt slots startInertia startTick transient transitionCamera uncovered urgency winds zoomToRect
+  setRequests showElement showsAt slots startInertia startTick ticket transient transitionCamera uncovered unwrap urgency winds zoomToRect
 `
   .trim()
   .split(/\s+/);

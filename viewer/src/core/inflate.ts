@@ -17,7 +17,7 @@ export async function inflate(parts: Uint8Array<ArrayBuffer>[], size: number): P
   }
   if (at !== size) {
     reader.cancel().catch(() => undefined);
-    throw new DecodeError(`the pixel data does not have the ${String(size)} bytes that its header specifies`);
+    throw new DecodeError(`the pixel data does not have the ${String(size)} bytes of its header`);
   }
   return out;
 }

@@ -41,8 +41,7 @@ export async function decodePng(bytes: Uint8Array<ArrayBuffer>): Promise<Decoded
 }
 
 function readChunks(bytes: Uint8Array<ArrayBuffer>): { header: PngHeader; parts: Uint8Array<ArrayBuffer>[] } {
-  if (!SIGNATURE.every((byte, k) => bytes[k] === byte))
-    throw new DecodeError(`not a PNG: ${String(bytes.length)} bytes without the PNG signature`);
+  if (!SIGNATURE.every((byte, k) => bytes[k] === byte)) throw new DecodeError(`not a PNG (${String(bytes.length)} bytes)`);
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const parts: Uint8Array<ArrayBuffer>[] = [];
   let header: PngHeader | undefined;
@@ -60,7 +59,7 @@ function readChunks(bytes: Uint8Array<ArrayBuffer>): { header: PngHeader; parts:
 }
 
 function readHeader(view: DataView, at: number, length: number): PngHeader {
-  if (length !== 13) throw new DecodeError(`PNG's IHDR chunk has ${String(length)} bytes, expected 13`);
+  if (length !== 13) throw new DecodeError(`PNG: IHDR of ${String(length)} bytes, expected 13`);
   const [width, height] = [view.getUint32(at), view.getUint32(at + 4)];
   const [depth, type, interlace] = [view.getUint8(at + 8), view.getUint8(at + 9), view.getUint8(at + 12)];
   const channels = CHANNELS[type];
@@ -70,7 +69,7 @@ function readHeader(view: DataView, at: number, length: number): PngHeader {
     );
   }
   if (width < 1 || height < 1 || width > SIDE_LIMIT || height > SIDE_LIMIT) {
-    throw new DecodeError(`PNG of ${String(width)} × ${String(height)} pixels; expected 1 to ${String(SIDE_LIMIT)} on each side`);
+    throw new DecodeError(`PNG of ${String(width)} × ${String(height)} pixels; expected 1 to ${String(SIDE_LIMIT)} a side`);
   }
   return { width, height, channels };
 }
@@ -79,7 +78,7 @@ function unfilter(bytes: Uint8Array, row: number, stride: number, channels: numb
   const [from, to] = [row * (stride + 1) + 1, row * stride];
   const filter = bytes[from - 1] ?? 0;
   const undo = FILTERS[filter];
-  if (!undo) throw new DecodeError(`PNG row ${String(row)} has filter ${String(filter)}, expected 0 to 4`);
+  if (!undo) throw new DecodeError(`PNG row ${String(row)} has filter ${String(filter)}`);
   undo(bytes, from, to, stride, channels, row > 0);
 }
 

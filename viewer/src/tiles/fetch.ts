@@ -33,7 +33,7 @@ export async function fetchJson(urls: readonly string[], options: FetchOptions =
   try {
     return JSON.parse(new TextDecoder().decode(bytes)) as unknown;
   } catch {
-    throw new FetchError(`${urls[0] ?? ""}: expected JSON, got ${String(bytes.byteLength)} bytes that do not parse`, 200);
+    throw new FetchError(`${urls[0] ?? ""}: not JSON (${String(bytes.byteLength)} bytes)`, 200);
   }
 }
 

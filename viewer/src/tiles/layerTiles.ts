@@ -116,10 +116,7 @@ export class LayerTiles {
     if (this.#isSilent) throw new FetchError(`${this.key(view, layer, tile)}: the server does not answer`);
     await this.#resources.queue.runNow(this.makeRequest(view, layer, tile));
     const loaded = this.get(view, layer, tile);
-    if (!loaded)
-      throw (
-        this.#failed.get(this.key(view, layer, tile))?.error ?? new FetchError(`${this.key(view, layer, tile)}: the request was aborted`)
-      );
+    if (!loaded) throw this.#failed.get(this.key(view, layer, tile))?.error ?? new FetchError(`${this.key(view, layer, tile)}: aborted`);
     return loaded.data;
   }
 

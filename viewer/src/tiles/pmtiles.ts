@@ -63,7 +63,7 @@ export class Archive {
       if (entry.run > 0) return this.#decompress(await this.#read(header.tiles + entry.offset, entry.length, signal), header.compression);
       [offset, length] = [header.leaves + entry.offset, entry.length];
     }
-    throw new FetchError(`${this.#name}: directories are nested deeper than ${String(DEPTH_LIMIT)}`);
+    throw new FetchError(`${this.#name}: directories deeper than ${String(DEPTH_LIMIT)}`);
   }
 
   async #open(): Promise<ArchiveHeader> {

@@ -68,6 +68,6 @@ async function decodeColor(kind: "color" | "picture", mediaType: string, bytes: 
     const bitmap = await createImageBitmap(blob, { premultiplyAlpha: "none", colorSpaceConversion: "none" });
     return { kind, width: bitmap.width, height: bitmap.height, bitmap };
   } catch (reason) {
-    throw new DecodeError(`the browser cannot decode a ${mediaType} tile of ${String(bytes.byteLength)} bytes: ${String(reason)}`);
+    throw new DecodeError(`cannot decode a ${mediaType} tile of ${String(bytes.byteLength)} bytes: ${String(reason)}`);
   }
 }

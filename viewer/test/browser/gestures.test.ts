@@ -234,7 +234,7 @@ test("an error names a broken tile; the others are shown", async () => {
   const { page } = await bed.start(name, { zoom: 3.5 });
   const errors = await page.evaluate(() => (globalThis as Global).errors);
   expect(errors.length).toBe(1);
-  expect(errors[0]).toMatch(/tile 0-45\/normal\/3\/3\/4: not a PNG: 3 bytes/);
+  expect(errors[0]).toMatch(/tile 0-45\/normal\/3\/3\/4: not a PNG \(3 bytes\)/);
 });
 
 test("a pick is approximate if its deepest tile cannot be fetched", async () => {
