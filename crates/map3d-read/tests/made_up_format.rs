@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use crate::documents::{Folder, encode_png, is_format_error};
+use crate::documents::{Folder, encode_png, is_error_of};
 use map3d_base::asset::{AssetMesh, AssetReport, AssetWriter, Batch, Instance, Material, Materials, Object, Rank};
-use map3d_base::{Error, Result};
+use map3d_base::{Error, Reason, Result};
 use map3d_read::{DocumentImage, DocumentReader, FileHead, ImageSource, OpenDocument, ReadOptions, SourceFormat, open, write_tables};
 use serde::Deserialize;
 
@@ -125,8 +125,8 @@ fn images_inside_documents_have_the_limits_of_image_files() {
     let folder = Folder::new("sign");
     let path = put_sign(&folder, &encode_png(4, 2, [10, 20, 30, 40]));
     let limited = ReadOptions { max_image_px: 7, ..ReadOptions::default() };
-    assert!(is_format_error(open(&path, SIGN, &limited), "Textures of more than 7 pixels"));
-    assert!(is_format_error(open(&put_sign(&folder, b"no image"), SIGN, &ReadOptions::default()), "Textures in a format that map3d does not read"));
+    assert!(is_error_of(open(&path, SIGN, &limited), Reason::ImagePixelsOverLimit.with("limit", 7)));
+    assert!(is_error_of(open(&put_sign(&folder, b"no image"), SIGN, &ReadOptions::default()), Reason::ImageFormatUnknown));
 }
 
 #[test]

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use map3d_base::asset::{AssetReport, Batch, Instance, Material, Object, Rank};
+use map3d_base::reason::Message;
 use map3d_base::vec3::{length, triangle_normal};
 use map3d_base::{Error, Result, Vec3};
 use map3d_read::{DocumentImage, FileHead, ReadOptions, SourceFormat, detect, open};
@@ -182,6 +183,11 @@ pub fn compute_area(corners: [Vec3; 3]) -> f64 {
 
 pub fn is_format_error<T>(result: Result<T>, part: &str) -> bool {
     matches!(result, Err(Error::Format { what, .. }) if what.contains(part))
+}
+
+/// Returns true if `strict` or a reader refused the file for this reason.
+pub fn is_error_of<T>(result: Result<T>, reason: impl Into<Message>) -> bool {
+    is_format_error(result, &reason.into().to_string())
 }
 
 pub fn is_limit_error<T>(result: Result<T>, name: &str) -> bool {
