@@ -15,8 +15,8 @@ from rasterio.errors import NotGeoreferencedWarning
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
 from map3d.catalogue import SceneRecord, Workspace
+from map3d.coherence.import_files import FilesImport, import_files
 from map3d.errors import ImportFailed
-from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.registry import Registry
 from map3d.site.files import ImportSummary, SiteFiles, update_files

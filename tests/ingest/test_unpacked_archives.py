@@ -7,8 +7,8 @@ import pytest
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
 from map3d.catalogue import SceneRecord, Workspace
+from map3d.coherence.import_files import import_files
 from map3d.errors import ImportFailed
-from map3d.ingest.import_files import import_files
 from map3d.ingest.import_options import ImportOptions
 from tests.operations.archives import write_zip
 

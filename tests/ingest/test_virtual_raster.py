@@ -13,8 +13,8 @@ pytest.importorskip("map3d._core", reason="the compiled core is not built")
 
 import map3d
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
+from map3d.coherence.import_files import FilesImport, import_files
 from map3d.errors import ImportFailed, UnknownFormat
-from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.sources import find_sources

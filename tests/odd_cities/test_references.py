@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 from map3d.catalogue import SceneRecord, Workspace
+from map3d.coherence.import_files import FilesImport, import_files
 from map3d.formats.citygml_links import find_document_links, find_geometry_documents
-from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.sources import find_sources, source_digest
 from tests.findings import warned

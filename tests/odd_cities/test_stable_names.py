@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import SceneRecord, Workspace
-from map3d.ingest.import_files import import_files
+from map3d.coherence.import_files import import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.registry import Registry
 from map3d.site.files import ImportSummary, SiteFiles, update_files

@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from map3d.catalogue import SceneRecord, Workspace
+from map3d.coherence.import_files import import_files
 from map3d.formats import OBJ as OBJ_FORMAT
-from map3d.ingest.import_files import import_files
 from map3d.ingest.import_options import ImportOptions
 from tests.cli.towns import Run, house
 from tests.odd_cities.towns import write_citygml

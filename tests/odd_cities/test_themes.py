@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import SceneRecord, Workspace
-from map3d.ingest.import_files import import_files
+from map3d.coherence.import_files import import_files
 from map3d.ingest.import_options import ImportOptions
 from tests.findings import warned
 from tests.odd_cities.appearances import add_themes

@@ -202,7 +202,7 @@ def test_tiles_added_one_after_another_are_all_there(tmp_path: Path) -> None:
     dems = write_tiles(tmp_path / "tiles", "dem", hills(20, 40), 20)
     photos = write_tiles(tmp_path / "tiles", "photo", colours(20, 40), 20)
     from map3d.catalogue import SceneRecord, Workspace
-    from map3d.ingest.import_files import import_files
+    from map3d.coherence.import_files import import_files
     from map3d.ingest.import_options import ImportOptions
 
     workspace = Workspace(tmp_path / "workspace").create()

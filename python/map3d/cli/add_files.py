@@ -19,7 +19,7 @@ from map3d.messages import Message
 from map3d.requests import AddFiles
 
 if TYPE_CHECKING:
-    from map3d.ingest.import_files import OnFile
+    from map3d.coherence.import_files import OnFile
 
 
 @click.command("add-files")
@@ -35,7 +35,7 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], request: Ad
     A file that is in the scene already replaces its asset; its objects keep their ids. A file with the same name
     from another folder is an asset of its own, unless the first one is gone. --name NAME replaces the asset NAME.
     """
-    from map3d.ingest.import_files import import_files
+    from map3d.coherence.import_files import import_files
     from map3d.ingest.import_options import ImportOptions
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())

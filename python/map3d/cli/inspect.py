@@ -18,7 +18,7 @@ from map3d.requests import Inspect
 
 if TYPE_CHECKING:
     from map3d.catalogue import SceneCrs
-    from map3d.ingest.import_files import OnFile
+    from map3d.coherence.import_files import OnFile
     from map3d.scenes.file_contents import FileContents
     from map3d.scenes.inspection import Inspection
 

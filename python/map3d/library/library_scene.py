@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
+from map3d.coherence.import_files import FilesImport, import_files
 from map3d.geometry.views import parse_view
-from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.jobs.dead_workers import expire_dead_workers
 from map3d.library.library_rendering import LibraryRendering, light_of

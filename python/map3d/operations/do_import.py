@@ -5,9 +5,9 @@ from functools import partial
 from typing import Final
 
 from map3d.catalogue import Catalogue, OperationRecord, Workspace
+from map3d.coherence.import_files import FilesImport, import_files
 from map3d.errors import ImportFailed
 from map3d.ingest.findings import findings, skipped_count
-from map3d.ingest.import_files import FilesImport, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported
 from map3d.messages import Message, message

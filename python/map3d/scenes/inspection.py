@@ -7,8 +7,8 @@ from tempfile import TemporaryDirectory
 from typing import Final
 
 from map3d.catalogue import Catalogue, SceneCrs, SceneRecord, Workspace
+from map3d.coherence.import_files import OnFile, import_files
 from map3d.ingest.content import Cluster, find_content
-from map3d.ingest.import_files import OnFile, import_files
 from map3d.ingest.import_options import ImportOptions
 from map3d.messages import Message
 from map3d.scenes.file_contents import FileContents, file_contents, union
