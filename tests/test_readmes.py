@@ -86,7 +86,7 @@ def test_crates_name_their_dependencies(folder: Path) -> None:
 
 def test_folders_of_the_viewer_name_those_below() -> None:
     lint = (ROOT / "viewer" / "eslint.config.js").read_text("utf-8")
-    ranks = {name: int(rank) for name, rank in re.findall(r"(\w+): (\d)", re.findall(r"const RANKS = (.*)", lint)[0])}
+    ranks = {name: int(rank) for name, rank in re.findall(r"(\w+): (\d)", re.findall(r"const RANKS = \{(.*?)\n\}", lint, re.DOTALL)[0])}
     seen_by_entries = set(re.findall(r'"(\w+)"', re.findall(r"const SEEN_BY_ENTRIES = (.*)", lint)[0]))
     assert {folder.name for folder in VIEWER} == (set(ranks) - {"map3d"}) | ENTRIES
     for folder in VIEWER:

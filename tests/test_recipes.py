@@ -44,7 +44,7 @@ def test_every_entry_is_complete() -> None:
     effects = {name for path in json.loads(read("viewer/package.json"))["sideEffects"] for name in re.findall(r"map3d-(\w+)\.module\.js", path)}
     assert set(budgets) == {"core", *entries, "full"}
     assert [name for name in entries if f"`map3d-{name}`" not in readme] == []
-    registering = {name for name in entries if re.search(r"features\[|customElements", read(f"viewer/src/{name}/index.ts"))}
+    registering = {name for name in entries if re.search(r"plugins\[|customElements", read(f"viewer/src/{name}/index.ts"))}
     assert effects == {*registering, "full"}
 
 

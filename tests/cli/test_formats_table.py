@@ -50,7 +50,7 @@ def test_a_row_says_what_is_drawn_and_what_is_not(tmp_path: Path, make_formats: 
     (folder / "bad.obj").write_text(house(0, 0, 5) + "f 1 1 1\n")
     cells = [cell.strip() for cell in make_formats.row(folder).split(" | ")]
     assert cells[:5] == ["| town", "2 CityGML files: 32 Building, 192 polygons; 1 OBJ file: 7 faces", "17", "204", "–"]
-    assert cells[5].startswith("1 × face-with-too-few-vertices; 1 file: the file does not name its CRS; name it with --crs")
+    assert cells[5].startswith("Skipped faces with fewer than 3 vertices: 1; 1 file: the file does not name its CRS; name it with --crs")
 
 
 @pytest.mark.skipif(not DATA, reason="MAP3D_DATA does not name the folder of real data sets")

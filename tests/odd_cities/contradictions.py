@@ -51,7 +51,7 @@ class Drawn:
 
 
 def draw(folder: Path, options: Mapping[str, Any]) -> Drawn:
-    """Imports a folder `city` and returns what a build of it draws, without what lies far from the rest."""
+    """Imports a folder `city` and returns what a build of it draws, without all that is far from the rest."""
     workspace = Workspace(folder / "workspace").create()
     with workspace.open_catalogue() as catalogue:
         catalogue.create_scene(SceneRecord("city"))

@@ -44,8 +44,8 @@ def azimuth_deg(light: PictureLight) -> float:
 
 @pytest.mark.parametrize("name", ["SUN", "SKY"])
 def test_the_colours_are_those_of_the_viewer(name):
-    (text,) = re.findall(rf"const {name}: readonly ColorStop\[\] = (\[.*\]);", VIEWER.read_text())
-    stops = json.loads(text.replace("WHITE", "[1, 1, 1]"))
+    (text,) = re.findall(rf"const {name}: readonly ColorStop\[\] = (\[.*?\n\]);", VIEWER.read_text(), re.DOTALL)
+    stops = json.loads(re.sub(r",\s*\]", "]", text.replace("WHITE", "[1, 1, 1]")))
     assert [[elevation, list(color)] for elevation, color in getattr(daylight, name)] == stops
 
 

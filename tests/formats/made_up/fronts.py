@@ -83,7 +83,7 @@ def _work(workspace: Workspace) -> None:
 def _result(workspace: Workspace, shown: str) -> dict[str, Any]:
     with contextlib.closing(workspace.open_catalogue()) as catalogue:
         assets = [{"name": asset.name, "format": asset.format, "report": asset.report} for asset in catalogue.assets("town")]
-        log = [line.text for one in catalogue.operations() for line in catalogue.operation_log(one.id)]
+        log = [str(line.text) for one in catalogue.operations() for line in catalogue.operation_log(one.id)]
     return {"assets": assets, "shown": shown, "log": log}
 
 
