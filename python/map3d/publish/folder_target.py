@@ -63,7 +63,9 @@ class FolderTarget(Target):
     def finish(self) -> None:
         self.add(CHECKSUMS, dump_checksums(self.digests))
         self._remove_leftovers()
-        self.removed = sorted(self.old_sizes.keys() - self.digests.keys())
+        self.divide_old(self.old_sizes)
+        for name in self.kept_for_open_maps:
+            _link(self.folder / name, self.draft / name)
         _replace_folder(self.draft, self.folder)
 
     def _remove_leftovers(self) -> None:

@@ -1,8 +1,8 @@
 """Publishes to an object store: sends the files whose content changed, the manifest last, and deletes afterwards what no longer belongs.
 
 The checksums file in the store is also the journal: before the first file is overwritten, the digests of all files that may change become UNKNOWN.
-A stopped publication is therefore completed by the next one. Archives and search pages have names that follow from their content, so a visitor with
-an old page finds old files until the deletion.
+A stopped publication is therefore completed by the next one. Archives and search pages have names that follow from their content, and stay for one
+more publication, so a visitor with an old page finds old files.
 """
 
 import mimetypes
@@ -99,7 +99,7 @@ class StoreTarget(Target):
     def finish(self) -> None:
         self._wait(0)
         present = {*self.old_digests, *filter(is_written_by_publish, self.old_sizes)} & self.old_sizes.keys()
-        self.removed = sorted(present - self.digests.keys() - {CHECKSUMS})
+        self.divide_old(present)
         sums = dump_checksums(self.digests)
         if self.removed and not self._overwriting:
             self._mark_overwritten()

@@ -2,6 +2,7 @@
 
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Collection
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -48,6 +49,8 @@ class Target(ABC):
         self.changed: dict[str, int] = {}
         """Sizes of the files that were written or sent."""
         self.removed: list[str] = []
+        self.kept_for_open_maps: list[str] = []
+        """Files of the publication that this one replaces, which open maps may still read: they stay until the next one."""
         self.kept_archives = 0
         self.old_digests: dict[str, str] = {}
         self.old_sizes: dict[str, int] = {}
@@ -75,6 +78,12 @@ class Target(ABC):
     @abstractmethod
     def finish(self) -> None:
         """Writes the checksums and removes what no longer belongs."""
+
+    def divide_old(self, present: Collection[str]) -> None:
+        """Divides the files present that are not part of the new state into those that stay for open maps and those to be removed."""
+        old = sorted(set(present) - self.digests.keys() - {CHECKSUMS})
+        self.kept_for_open_maps = [name for name in old if is_named_by_content(name) and self.old_digests.get(name, UNKNOWN) != UNKNOWN]
+        self.removed = sorted(set(old) - set(self.kept_for_open_maps))
 
     def close(self) -> None:  # noqa: B027
         """Releases what the target holds, also after an error."""
@@ -127,4 +136,4 @@ class DryRun(Target):
 
     def finish(self) -> None:
         present = {*self.old_digests, *(name for name in self.old_sizes if is_written_by_publish(name))} & self.old_sizes.keys()
-        self.removed = sorted(present - self.digests.keys() - {CHECKSUMS})
+        self.divide_old(present)
