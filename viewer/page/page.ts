@@ -35,7 +35,7 @@ const MAX_TITLE = 200;
 function open(): void {
   const isFresh = location.hash === "";
   const { time, id, by, epoch = 0, ...start } = readPermalink(location.hash);
-  const view = new Map3D("mapcanvas", { cover: true, light: lightAt(FIRST_HOUR), ...start });
+  const view = new Map3D("mapcanvas", { cover: true, gestureHandling: "auto", light: lightAt(FIRST_HOUR), ...start });
   const urls = baseUrls();
   const layer = new ImageLayer(urls);
   const info = new InfoPanel(byId("info"), () => selection.clear());

@@ -1,5 +1,5 @@
 import { addPanelButton } from "../core/panelButton";
-import { adoptStyles, element, iconButton } from "../core/dom";
+import { adoptStyles, element, iconButton, positionIn } from "../core/dom";
 import { add, dot, sub, type Box3, type Vec2 } from "../core/vec";
 import { MapLayer, Map3D } from "../map3d";
 import { STYLES } from "./styles";
@@ -29,6 +29,8 @@ export class Overview extends MapLayer<Map3D, object> {
   #button = element("button", "");
   #box: HTMLElement | undefined;
   #small: Map3D | undefined;
+  /** Middle of the frame, CSS pixels of the pad. */
+  #center: Vec2 = [0, 0];
   #listeners = new AbortController();
 
   constructor(options: OverviewOptions = {}) {
@@ -132,6 +134,7 @@ export class Overview extends MapLayer<Map3D, object> {
     const scale = (this.map as Map3D).metresPerPixel / px_m;
     const x = (shown.camera.u + dot(right, shift) - small.camera.u) / px_m + small.camera.width / 2;
     const y = (small.camera.v - shown.camera.v - dot(up, shift)) / px_m + small.camera.height / 2;
+    this.#center = [x, y];
     const [width, height] = [shown.camera.width * scale, shown.camera.height * scale];
     Object.assign(this.#frame.style, {
       width: `${width.toFixed(1)}px`,
@@ -145,21 +148,24 @@ export class Overview extends MapLayer<Map3D, object> {
     let drag: { at: Vec2; moved: boolean } | null = null;
     this.#pad.addEventListener(
       "pointerdown",
-      ({ button, pointerId, target, clientX, clientY }) => {
-        if (button !== 0) return;
-        this.#pad.setPointerCapture(pointerId);
+      (event) => {
+        if (event.button !== 0) return;
+        this.#pad.setPointerCapture(event.pointerId);
         this.map?.startGesture();
-        drag = { at: [clientX, clientY], moved: target !== this.#frame };
+        drag = { at: positionIn(this.#pad, event), moved: event.target !== this.#frame };
         if (drag.moved) this.#goTo(drag.at);
       },
       { signal },
     );
     this.#pad.addEventListener(
       "pointermove",
-      ({ clientX, clientY }) => {
-        if (!drag || (!drag.moved && Math.hypot(clientX - drag.at[0], clientY - drag.at[1]) < TAP_PX)) return;
-        this.#shift(clientX - drag.at[0], clientY - drag.at[1], false);
-        drag = { at: [clientX, clientY], moved: true };
+      (event) => {
+        if (!drag) return;
+        const at = positionIn(this.#pad, event);
+        const [dx, dy] = [at[0] - drag.at[0], at[1] - drag.at[1]];
+        if (!drag.moved && Math.hypot(dx, dy) < TAP_PX) return;
+        this.#shift(dx, dy, false);
+        drag = { at, moved: true };
       },
       { signal },
     );
@@ -192,8 +198,7 @@ export class Overview extends MapLayer<Map3D, object> {
   }
 
   #goTo([x, y]: Vec2): void {
-    const { left, top, width, height } = this.#frame.getBoundingClientRect();
-    this.#shift(x - left - width / 2, y - top - height / 2, true);
+    this.#shift(x - this.#center[0], y - this.#center[1], true);
   }
 
   /** Pans the map by pixels of the small map. */

@@ -1,3 +1,5 @@
+import type { Vec2 } from "./vec";
+
 type Child = Node | string;
 
 /** Creates an element; strings among its children become text, never HTML. */
@@ -30,6 +32,18 @@ export function icon(path: string): SVGSVGElement {
   line.setAttribute("d", path);
   svg.append(line);
   return svg;
+}
+
+/** Returns where a pointer event is in an element's own CSS pixels, from its top left corner: a `transform` or `zoom` of the page does not count. */
+export function positionIn(target: HTMLElement, event: MouseEvent): Vec2 {
+  let own = event;
+  if (event.target !== target) {
+    // Browsers compute the offset from an event's target, through all transforms.
+    own = new PointerEvent("map3d-position", { clientX: event.clientX, clientY: event.clientY });
+    target.dispatchEvent(own);
+  }
+  const { currentCSSZoom = 1 } = target as { readonly currentCSSZoom?: number };
+  return [own.offsetX / currentCSSZoom, own.offsetY / currentCSSZoom];
 }
 
 const adopted = new WeakMap<Document, Set<string>>();

@@ -34,6 +34,9 @@ export class UsageError extends Map3dError {
   override name = "UsageError";
 }
 
+/** Whether the server does not have a file; S3 answers 403. */
+export const isGone = (error: Error): boolean => error instanceof FetchError && [403, 404, 410].includes(error.status);
+
 export function asError(reason: unknown): Error {
   return reason instanceof Error ? reason : new Map3dError(String(reason));
 }

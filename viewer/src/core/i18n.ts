@@ -16,6 +16,9 @@ export interface MapMessages {
   readonly scale: (length: string) => string;
   readonly details: string;
   readonly close: string;
+  /** Shown while the page scrolls over the map. */
+  readonly twoFingers: string;
+  readonly wheelWithKey: (key: string) => string;
 }
 
 const EN: MapMessages = {
@@ -34,6 +37,8 @@ const EN: MapMessages = {
   scale: (length) => `Scale: ${length}`,
   details: "Details",
   close: "Close",
+  twoFingers: "Use two fingers to move the map",
+  wheelWithKey: (key) => `Use ${key} + scroll to zoom the map`,
 };
 
 const DE: MapMessages = {
@@ -52,6 +57,8 @@ const DE: MapMessages = {
   scale: (length) => `Maßstab: ${length}`,
   details: "Details",
   close: "Schließen",
+  twoFingers: "Karte mit zwei Fingern bewegen",
+  wheelWithKey: (key) => `Karte mit ${key === "Ctrl" ? "Strg" : key} + Scrollen zoomen`,
 };
 
 const FR: MapMessages = {
@@ -70,6 +77,8 @@ const FR: MapMessages = {
   scale: (length) => `Échelle\u00a0: ${length}`,
   details: "Détails",
   close: "Fermer",
+  twoFingers: "Déplacez la carte avec deux doigts",
+  wheelWithKey: (key) => `${key} + défilement pour zoomer`,
 };
 
 /** One value for each supported language. */

@@ -1,3 +1,4 @@
+import { positionIn } from "../core/dom";
 import type { EnableDragging } from "../core/overlayHost";
 import type { Vec2 } from "../core/vec";
 
@@ -19,20 +20,17 @@ export const enableDragging: EnableDragging = (handle, map, position, onDrag) =>
     const at = start && map.project(start);
     if (drag || event.button !== 0 || !at) return;
     handle.setPointerCapture(event.pointerId);
-    drag = {
-      id: event.pointerId,
-      from: [event.clientX, event.clientY],
-      offset: [at[0] - event.clientX, at[1] - event.clientY],
-      moved: false,
-    };
+    const from = positionIn(map.container, event);
+    drag = { id: event.pointerId, from, offset: [at[0] - from[0], at[1] - from[1]], moved: false };
   });
   handle.addEventListener("pointermove", (event) => {
     if (drag?.id !== event.pointerId) return;
-    if (!drag.moved && Math.hypot(event.clientX - drag.from[0], event.clientY - drag.from[1]) < START_PX) return;
+    const [x, y] = positionIn(map.container, event);
+    if (!drag.moved && Math.hypot(x - drag.from[0], y - drag.from[1]) < START_PX) return;
     const start = position();
     if (!drag.moved && start) onDrag("dragstart", start);
     drag.moved = true;
-    moveTo(event.clientX + drag.offset[0], event.clientY + drag.offset[1]);
+    moveTo(x + drag.offset[0], y + drag.offset[1]);
   });
   const ended = (event: PointerEvent): void => {
     if (drag?.id !== event.pointerId) return;

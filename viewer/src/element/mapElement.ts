@@ -57,16 +57,17 @@ const OPTIONS: OptionAttributes = {
   controls: { read: (element) => isOn(element, "controls") },
   attribution: { read: (element) => isOn(element, "attribution") },
   hover: { read: (element) => isOn(element, "hover") },
+  gestureHandling: { read: text("gesturehandling") as OptionAttribute<NonNullable<MapOptions["gestureHandling"]>>["read"] },
   language: { read: text("language") },
 };
-const OPTION_ROWS = Object.entries(OPTIONS) as [string, OptionAttribute<unknown>][];
+const OPTION_ROWS = Object.entries(OPTIONS) as [keyof MapOptions, OptionAttribute<unknown>][];
 
 /** Changes of these attributes create a new map. */
 const RECREATING: ReadonlySet<string> = new Set([
   "src",
   "label",
   ...PLUGINS,
-  ...OPTION_ROWS.flatMap(([name, { apply }]) => (apply ? [] : [name])),
+  ...OPTION_ROWS.flatMap(([name, { apply }]) => (apply ? [] : [name.toLowerCase()])),
 ]);
 /** Changes of these attributes are applied to the map. */
 const APPLIED = ["lonlat", "time", "mode", "opacity", ...OPTION_ROWS.flatMap(([name, { apply }]) => (apply ? [name] : []))];
@@ -247,7 +248,9 @@ export class MapElement extends PageElement implements ElementHost {
 
   #options(): MapOptions {
     const given = OPTION_ROWS.map(([name, { read }]) => [name, this.#saved[name as keyof SavedState] ?? this.#try(() => read(this))]);
-    return Object.fromEntries([["cover", true], ...given].filter(([, value]) => value !== undefined)) as MapOptions;
+    return Object.fromEntries(
+      [["cover", true], ["gestureHandling", "auto"], ...given].filter(([, value]) => value !== undefined),
+    ) as MapOptions;
   }
 
   /** Applies a changed attribute to the map. A removed attribute changes nothing, except for those of the layer. @throws UsageError */

@@ -1,5 +1,7 @@
-import { element } from "../core/dom";
+import { element, positionIn } from "../core/dom";
 import type { Vec2 } from "../core/vec";
+import { Cooperation } from "./cooperation";
+import type { FilledOptions } from "./options";
 
 /** A map as controlled by gestures. Screen positions are CSS pixels from the container's top left corner. */
 export interface GestureTarget {
@@ -9,8 +11,9 @@ export interface GestureTarget {
   panBy(dx: number, dy: number): unknown;
   /** Moves the picture with a pointer. */
   dragBy(dx: number, dy: number): void;
-  /** Whether a drag with Shift draws a rectangle to zoom to. */
-  readonly options: { readonly boxZoom: boolean };
+  readonly language: string;
+  /** `boxZoom`: whether a drag with Shift draws a rectangle to zoom to. */
+  readonly options: Pick<FilledOptions, "boxZoom" | "gestureHandling">;
   zoomToRect(from: Vec2, to: Vec2): void;
   startInertia(velocity: Vec2): void;
   /** Zooms at once, without animation. */
@@ -43,6 +46,7 @@ export class Gestures {
   readonly #canvas: HTMLCanvasElement;
   readonly #pointers = new Map<number, Pointer>();
   readonly #listeners = new AbortController();
+  readonly #cooperation: Cooperation;
   #recentPoints: { at: Vec2; ms: number }[] = [];
   #moved = false;
   /** Last position of a drag with the right button. */
@@ -54,6 +58,7 @@ export class Gestures {
   constructor(map: GestureTarget, canvas: HTMLCanvasElement) {
     this.#map = map;
     this.#canvas = canvas;
+    this.#cooperation = new Cooperation(map.container, map.options.gestureHandling, map.language);
     const { signal } = this.#listeners;
     canvas.addEventListener("pointerdown", (event) => this.#down(event), { signal });
     canvas.addEventListener("pointermove", (event) => this.#move(event), { signal });
@@ -61,16 +66,22 @@ export class Gestures {
     canvas.addEventListener("pointercancel", (event) => this.#up(event, false), { signal });
     canvas.addEventListener("pointerleave", () => this.#map.hover(null), { signal });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault(), { signal });
+    canvas.addEventListener("touchmove", (event) => this.#keepTouch(event), { signal, passive: false });
     canvas.addEventListener("wheel", (event) => this.#wheel(event), { signal, passive: false });
   }
 
   destroy(): void {
     this.#listeners.abort();
+    this.#cooperation.destroy();
   }
 
   #toScreen(event: MouseEvent): Vec2 {
-    const box = this.#canvas.getBoundingClientRect();
-    return [event.clientX - box.left, event.clientY - box.top];
+    return positionIn(this.#canvas, event);
+  }
+
+  /** Keeps a touch from scrolling the page; cooperative, only one with several fingers. */
+  #keepTouch(event: TouchEvent): void {
+    if (event.cancelable && (event.touches.length > 1 || !this.#cooperation.isActive)) event.preventDefault();
   }
 
   #down(event: PointerEvent): void {
@@ -100,6 +111,10 @@ export class Gestures {
     }
     if (!this.#moved && Math.hypot(at[0] - pointer.start[0], at[1] - pointer.start[1]) < TAP_PX) return;
     this.#moved = true;
+    if (event.pointerType === "touch" && this.#pointers.size === 1 && this.#cooperation.isActive) {
+      this.#cooperation.showHint(true);
+      return;
+    }
     if (this.#box) this.#map.container.append(this.#box);
     else this.#map.container.classList.add("map3d-dragging");
     const other = [...this.#pointers].find(([id]) => id !== event.pointerId)?.[1];
@@ -173,6 +188,10 @@ export class Gestures {
   }
 
   #wheel(event: WheelEvent): void {
+    if (this.#cooperation.isActive && !event.ctrlKey && !event.metaKey) {
+      this.#cooperation.showHint(false);
+      return;
+    }
     event.preventDefault();
     const lines = event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 24 : event.deltaMode === WheelEvent.DOM_DELTA_PAGE ? 240 : 1;
     const pixels = Math.max(-240, Math.min(240, event.deltaY * lines));

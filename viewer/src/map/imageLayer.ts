@@ -2,7 +2,7 @@ import { checkNumber } from "../core/check";
 import { getPlugin } from "../core/plugins";
 import { MapLayer } from "../core/mapLayer";
 import { fillOptions, option, optionOr, type FilledOptionsOf, type OptionsOf } from "../core/options";
-import { asError, UsageError } from "../core/errors";
+import { asError, isGone, UsageError } from "../core/errors";
 import type { Vec2 } from "../core/vec";
 import { parseColor, type Rgb } from "../draw/color";
 import type { Clip } from "../draw/depthMapping";
@@ -255,17 +255,13 @@ export class ImageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
     const context = map.layerContext;
     if (!context) return; // the map has reported why
     this.#context = context;
-    this.#name = context.createName();
     const failed = (error: Error): void => {
       if (this.#context !== context) return;
       if (!this.#rendering) this.loadError = error;
       this.fire("error", { error });
       context.report(error);
     };
-    this.#tiles = new LayerTiles(this.#name, this.source, context.tileResources, (error) => {
-      if (error) failed(error);
-      context.requestFrame();
-    });
+    this.#openTiles(context, failed);
     this.source
       .manifest()
       .then((rendering) => {
@@ -386,13 +382,42 @@ export class ImageLayer extends MapLayer<ImageLayerHost, ImageLayerEvents> {
   }
 
   #start(rendering: Rendering, context: LayerContext): void {
+    this.#show(rendering, context);
+    this.fire("ready", { rendering });
+  }
+
+  #show(rendering: Rendering, context: LayerContext): void {
     context.checkCompatible(rendering);
     this.#rendering = rendering;
     this.#objects = new Objects(this.source, rendering.json);
     this.#findDescendants();
     context.onManifest(rendering);
     this.#checkLayers();
-    this.fire("ready", { rendering });
+  }
+
+  #openTiles(context: LayerContext, failed: (error: Error) => void): void {
+    this.#name = context.createName();
+    const tiles = new LayerTiles(this.#name, this.source, context.tileResources, (error) => {
+      if (tiles !== this.#tiles) return;
+      if (error && isGone(error)) this.#renew(context, error, failed).catch(failed);
+      else if (error) failed(error);
+      context.requestFrame();
+    });
+    this.#tiles = tiles;
+  }
+
+  /** Shows the publication that has replaced the one whose file is gone. @param failed called with the error when there is none */
+  async #renew(context: LayerContext, error: Error, failed: (error: Error) => void): Promise<void> {
+    const before = this.#rendering;
+    const rendering = await this.source.manifest(undefined, true);
+    if (this.#context !== context || this.#rendering !== before) return;
+    if (rendering.json.content_version === before?.json.content_version) {
+      failed(error);
+      return;
+    }
+    context.dropTiles(this.#name);
+    this.#openTiles(context, failed);
+    this.#show(rendering, context);
   }
 
   #checkLayers(): void {

@@ -30,6 +30,8 @@ export const MAP_OPTIONS = {
   maxBounds: option<Bounds>(ifGiven(checkBounds)),
   /** A drag with Shift zooms to a rectangle. Default true. */
   boxZoom: optionOr<boolean>(true),
+  /** Who has the wheel and one finger: "greedy" the map; "cooperative" the page, so that the wheel zooms with Ctrl or ⌘ and two fingers move the map; "auto" the page if it scrolls or is in a frame. In full screen, the map. Default "greedy"; `<map-3d>` and the ready-made page use "auto". */
+  gestureHandling: optionOr<"greedy" | "cooperative" | "auto">("greedy"),
   /** Without a zoom, enlarges a landscape at first until it fills the map; objects that are high for their width stay whole. Default false; the ready-made page and `<map-3d>` do it. */
   cover: optionOr<boolean>(false),
   /** Id of the initial view, such as "45-22.5". Default: the manifest's first view. */

@@ -7,6 +7,8 @@ export type FetchFunction = (url: string, init: RequestInit) => Promise<Response
 export interface FetchOptions extends RetryOptions {
   /** First byte and number of bytes. Default: the whole file. */
   range?: readonly [number, number] | undefined;
+  /** Passes the browser's cache at once. Default false. */
+  reload?: boolean | undefined;
   /** Default: the browser's fetch. */
   fetch?: FetchFunction | undefined;
 }
@@ -19,7 +21,7 @@ export interface FetchOptions extends RetryOptions {
 export function fetchBytes(urls: readonly string[], options: FetchOptions = {}): Promise<ArrayBuffer | null> {
   return retry(async (failed) => {
     try {
-      return await fetchOnce(urls[failed % urls.length] ?? "", options, failed > 0);
+      return await fetchOnce(urls[failed % urls.length] ?? "", options, failed > 0 || options.reload === true);
     } catch (reason) {
       options.signal?.throwIfAborted();
       return new FailedAttempt(reason, isTransient(reason));
@@ -48,13 +50,22 @@ async function fetchOnce(
   try {
     response = await request(url, { signal: signal ?? null, headers, cache: reload ? "reload" : "default" });
   } catch (reason) {
-    throw new FetchError(`${url}: no response (${reason instanceof Error ? reason.message : String(reason)})`);
+    const hint = url.startsWith(globalThis.origin) ? "" : "; if the server runs, it has to send the header Access-Control-Allow-Origin: *";
+    throw new FetchError(`${url}: no response (${reason instanceof Error ? reason.message : String(reason)})${hint}`);
   }
+  const says = (header: string): string => response.headers.get(header) ?? "";
   if (response.status === 204) return null;
   if (!response.ok) throw new FetchError(`${url}: HTTP ${String(response.status)}`, response.status);
+  // Some hosts answer so in place of 404.
+  if (says("content-type").startsWith("text/html")) throw new FetchError(`${url}: the server sends a web page in place of this file`, 404);
   if (range && response.status !== 206)
     throw new FetchError(
       `${url}: the server ignores range requests (HTTP ${String(response.status)}, expected 206); use nginx, Apache or Caddy`,
+      response.status,
+    );
+  if (range && !/^(identity)?$/.test(says("content-encoding")))
+    throw new FetchError(
+      `${url}: the server compresses parts of files (Content-Encoding: ${says("content-encoding")}); switch compression off for .pmtiles`,
       response.status,
     );
   const bytes = await response.arrayBuffer();

@@ -1,4 +1,4 @@
-import { asError, DecodeError, FetchError } from "../core/errors";
+import { asError, DecodeError, FetchError, isGone } from "../core/errors";
 import { hasServiceWorker, isOffline } from "../core/network";
 import { ancestor, childrenOf, tileName, type Tile } from "../geo/frame";
 import { DATA_KINDS, LIGHT_KINDS, type LayerInfo, type View } from "../geo/manifest";
@@ -157,7 +157,7 @@ export class LayerTiles {
         this.#waitForServer(tries + 1);
       // The same cause has many messages, which differ by URL.
       const cause = error.name + error.message.replace(/\S*\/\S*/g, "");
-      const silent = isAhead() || this.#reported.has(cause);
+      const silent = (isAhead() && !isGone(error)) || this.#reported.has(cause);
       if (!silent) this.#reported.add(cause);
       this.#onArrival(silent ? null : error);
     } finally {

@@ -8,8 +8,8 @@ import { normalizeBaseUrl, tileUrls } from "./url";
 
 /** The origin of a rendering: its manifest, the files next to it, and its encoded tiles. Several layers may share one. */
 export interface Source {
-  /** Returns the checked manifest. @throws ManifestError, FetchError */
-  manifest(signal?: AbortSignal): Promise<Rendering>;
+  /** Returns the checked manifest. @param reload past the browser's cache  @throws ManifestError, FetchError */
+  manifest(signal?: AbortSignal, reload?: boolean): Promise<Rendering>;
   /** Returns a parsed file from the manifest's folder; null when it does not exist. @throws FetchError */
   json(path: string): Promise<unknown>;
   /** Returns the tile, encoded or decoded, owned by the caller; null when it is empty. @throws FetchError, or the signal's reason */
@@ -42,10 +42,10 @@ export class HttpSource implements Source {
     }
   }
 
-  async manifest(signal?: AbortSignal): Promise<Rendering> {
+  async manifest(signal?: AbortSignal, reload = false): Promise<Rendering> {
     const urls = this.#urls("rendering.json");
     try {
-      return readManifest(await fetchJson(urls, this.#withFetch({ signal, attempts: Math.max(3, urls.length) })), urls[0] ?? "");
+      return readManifest(await fetchJson(urls, this.#withFetch({ signal, reload, attempts: Math.max(3, urls.length) })), urls[0] ?? "");
     } catch (reason) {
       if (reason instanceof FetchError && reason.status === 404) reason.message += "; pass the URL of its folder";
       throw reason;

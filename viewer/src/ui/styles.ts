@@ -69,6 +69,22 @@ export const STYLES = css`
     user-select: none;
     -webkit-user-select: none;
   }
+  .map3d-cooperative > canvas {
+    touch-action: pan-x pan-y;
+  }
+  .map3d-hint {
+    position: absolute;
+    inset: 0;
+    display: grid;
+    place-items: center;
+    margin: 0;
+    padding: 1em;
+    background: rgb(0 0 0 / 55%);
+    color: #fff;
+    font-size: 1.25em;
+    text-align: center;
+    pointer-events: none;
+  }
   .map3d-dragging > canvas {
     cursor: grabbing;
   }

@@ -24,11 +24,12 @@ test("the page markup uses only known messages", () => {
 });
 
 test.each(["en", "de", "fr", "de-AT", "it", ""])("%s: every control has a name, every wind a different one", (language) => {
-  const { facing, scale, winds, ...names } = getMapMessages(language);
+  const { facing, scale, winds, wheelWithKey, ...names } = getMapMessages(language);
   expect(Object.values(names).every((name) => name.trim() !== "")).toBe(true);
   expect(new Set(winds).size).toBe(8);
   for (const wind of winds) expect(facing(wind)).toContain(wind);
   expect(scale("20 m")).toContain("20 m");
+  expect(wheelWithKey("⌘")).toContain("⌘");
 });
 
 test.each(["en", "de", "fr"])("%s: the captions of synchronized maps say what the compass says", (language) => {

@@ -87,6 +87,7 @@ export class WebGLDrawer implements Drawer {
     this.#textures = new TileTextures(gl);
     this.#idTextures = new IdTextures(gl);
     this.#listen(events);
+    if (gl.isContextLost()) restoreContext(canvas);
   }
 
   get element(): HTMLElement {
@@ -132,6 +133,7 @@ export class WebGLDrawer implements Drawer {
     this.#textures.clear();
     this.#idTextures.freeAllBut(new Set());
     this.#offscreen?.free();
+    loseContext(this.#canvas, this.gl);
   }
 
   /** Returns the target for a frame that needs depth; keeps it from frame to frame while it is needed. */
@@ -315,6 +317,25 @@ export class WebGLDrawer implements Drawer {
     this.#canvas.addEventListener("webglcontextlost", lost, { signal });
     this.#canvas.addEventListener("webglcontextrestored", restored, { signal });
   }
+}
+
+/** What restores the contexts that maps have given back; a lost context no longer has it. */
+const lost = new WeakMap<HTMLCanvasElement, WEBGL_lose_context>();
+
+/** Gives a context back at once: browsers have few, and take them from others on the page. */
+function loseContext(canvas: HTMLCanvasElement, gl: WebGL2RenderingContext): void {
+  const context = gl.getExtension("WEBGL_lose_context");
+  if (!context) return;
+  // Without this, the next map on the canvas could not restore it.
+  canvas.addEventListener("webglcontextlost", (event) => event.preventDefault(), { once: true });
+  lost.set(canvas, context);
+  context.loseContext();
+}
+
+/** Restores the context of a canvas that had a map before, once the browser has told its loss. */
+function restoreContext(canvas: HTMLCanvasElement): void {
+  const context = lost.get(canvas);
+  setTimeout(() => context?.restoreContext());
 }
 
 /** Whether WebGL runs on the CPU. Browsers report it by the flag above if they chose so themselves, and by the renderer's name otherwise. */
