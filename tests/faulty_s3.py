@@ -18,8 +18,9 @@ SLOW_S: Final = 0.2
 
 
 @contextmanager
-def faulty_proxy(endpoint: str, seed: int, share: float) -> Iterator[tuple[str, Counter[str]]]:
-    """Yields the proxy's endpoint and the counts of faults. `share`: of the requests, for each fault."""
+def faulty_proxy(endpoint: str, seed: int, share: float, ignored: str = "") -> Iterator[tuple[str, Counter[str]]]:
+    """Yields the proxy's endpoint and the counts of faults. `share`: of the requests, for each fault; `ignored`: a header of requests
+    that the server does not get."""
     choice, lock, counts = random.Random(seed), threading.Lock(), Counter[str]()
     target = urlsplit(endpoint).netloc
 
@@ -46,7 +47,7 @@ def faulty_proxy(endpoint: str, seed: int, share: float) -> Iterator[tuple[str, 
         def forward(self, body: bytes) -> tuple[int, list[tuple[str, str]], bytes]:
             connection = http.client.HTTPConnection(target, timeout=60)
             try:
-                connection.request(self.command, self.path, body, dict(self.headers.items()))
+                connection.request(self.command, self.path, body, {name: value for name, value in self.headers.items() if name.lower() != ignored})
                 response = connection.getresponse()
                 return response.status, response.getheaders(), response.read()
             finally:

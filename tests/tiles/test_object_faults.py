@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from map3d.errors import StaleFence
+from map3d.errors import StaleFence, StoreError
+from map3d.object_store import open_object_store
 from map3d.tiles.naming import tiles_of_block
 from map3d.tiles.object_tile_store import ObjectTileStore
 from map3d.tiles.sqlite_store import SqliteTileStore
@@ -49,3 +50,17 @@ def test_tiles_are_right_whatever_happens_to_requests(s3_endpoint: str, tmp_path
                 assert [reader.get_tile(layer, *tile) for tile in tiles] == [right.get_tile(layer, *tile) for tile in tiles]
             assert reader.get_seams(BLOCKS) == right.get_seams(BLOCKS)
         assert all(counts[fault] for fault in FAULTS), f"every fault has happened: {counts}"
+
+
+@pytest.mark.parametrize("header", ["If-None-Match", "If-Match"])
+def test_a_store_that_ignores_the_conditions_of_writes_is_refused(s3_endpoint: str, header: str) -> None:
+    with faulty_proxy(s3_endpoint, 1, 0.0, header.lower()) as (endpoint, _), environment(s3_environment(endpoint)):
+        url = new_prefix()
+        with pytest.raises(StoreError, match=f"ignores the condition {header} of writes"):
+            ObjectTileStore.open_or_create(url, SHAPE)
+        assert list(open_object_store(url).list()) == []
+
+
+def test_the_probe_of_conditions_leaves_nothing(s3_url: str) -> None:
+    ObjectTileStore.create(s3_url, SHAPE)
+    assert [name for name, _ in open_object_store(s3_url).list()] == ["store.json"]

@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Final, Self, TypeVar
 
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, Map3dError, NotFound, ObjectChanged, StaleFence, StoreError, UnknownVersion
-from map3d.object_store import open_object_store
+from map3d.object_store import check_conditional_writes, open_object_store
 from map3d.object_store.folder import FolderStore
 from map3d.tiles.block_object import START_BYTES, BlockIndex, Span, check_object, decode_index, encode_block, index_bytes
 from map3d.tiles.naming import block_levels, block_of, morton
@@ -53,10 +53,11 @@ class ObjectTileStore:
 
     @classmethod
     def create(cls, url: str, shape: StoreShape) -> Self:
-        """Creates an empty store. Raises AlreadyExists, StoreError."""
+        """Creates an empty store. Raises AlreadyExists; StoreError, also for an object store that ignores the conditions of writes."""
         objects = open_object_store(url)
         if objects.exists(SHAPE_NAME):
             raise AlreadyExists(f"{url}: the tile store already exists")
+        check_conditional_writes(objects)
         value = {"version": FORMAT_VERSION, "tile_px": shape.tile_px, "zmax": shape.zmax, "layers": [asdict(layer) for layer in shape.layers]}
         try:
             objects.put(SHAPE_NAME, json.dumps(value, indent=1).encode(), if_absent=True)
