@@ -25,8 +25,8 @@ def check_conditional_writes(objects: ObjectStore) -> None:
             with suppress(ObjectChanged):
                 objects.put(name, b"3", **options)
                 raise StoreError(
-                    f"{objects.url}: the object store ignores the condition {condition} of writes, so two workers could overwrite each other unnoticed; "
-                    "use S3, Google Cloud Storage, Azure or a server that heeds it, such as MinIO (docs/stores.md)"
+                    f"{objects.url}: the object store ignores the condition {condition} of writes, so two workers could overwrite each other "
+                    "unnoticed; use S3, Google Cloud Storage, Azure or a server that heeds it, such as MinIO (docs/stores.md)"
                 )
     finally:
         objects.delete(name)

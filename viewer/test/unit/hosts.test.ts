@@ -5,7 +5,7 @@ const URL_ = "https://host/town/0-45/color-00.pmtiles";
 const answer = (status: number, headers: Record<string, string>): Response => new Response(new Uint8Array(8), { status, headers });
 const read = (given: () => Promise<Response>): Promise<unknown> => fetchBytes([URL_], { range: [100, 8], attempts: 1, fetch: given });
 
-describe("what a host does wrong with archives is named, with what mends it", () => {
+describe("what a host does wrong with archives is named, and how to correct it", () => {
   test.each([
     ["ignores ranges", answer(200, {}), /ignores range requests \(HTTP 200.*nginx/],
     [
