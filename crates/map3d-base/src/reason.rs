@@ -154,6 +154,7 @@ reasons! {
     RingWithTooFewPoints = "ring-with-too-few-points": Skipped,
     RingOverLimit = "ring-over-limit": Skipped,
     SolidOfOpenSpace = "solid-of-open-space": Omitted,
+    StrayVertex = "stray-vertex": Skipped,
     TextureCoordinateNotFinite = "texture-coordinate-not-finite": Skipped,
     TinBreakLinesCross = "tin-break-lines-cross": Skipped,
     TinPointsOnALine = "tin-points-on-a-line": Skipped,

@@ -2,6 +2,7 @@
 
 mod boxes;
 mod mapped;
+mod stray_vertices;
 mod tables;
 mod validation;
 mod writer;

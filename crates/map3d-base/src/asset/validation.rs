@@ -1,6 +1,7 @@
 //! Validation of geometry on its way into an asset: triangles that are not finite, out of range or without area are skipped and counted.
 
 use super::Batch;
+use super::stray_vertices::leave_out_strays;
 use crate::Reason;
 use crate::vec3::{Vec3, length, triangle_normal};
 
@@ -25,6 +26,9 @@ pub struct SkippedGeometry {
     pub too_far: u64,
     pub zero_area: u64,
     pub bad_uv: u64,
+    /// Triangles that reach to a stray vertex, and the object of the first one.
+    pub stray: u64,
+    pub stray_object: Option<u32>,
 }
 
 impl SkippedGeometry {
@@ -42,7 +46,11 @@ impl SkippedGeometry {
 
 /// Returns which triangles of a batch are valid, in order. UVs that are not finite do not make a triangle invalid: the writer drops them.
 pub fn valid_triangles(batch: &Batch, limits: GeometryLimits, skipped: &mut SkippedGeometry) -> Vec<bool> {
-    batch.triangles.iter().map(|t| is_valid(&batch.positions, *t, limits, skipped)).collect()
+    let mut keep: Vec<bool> = batch.triangles.iter().map(|t| is_valid(&batch.positions, *t, limits, skipped)).collect();
+    let (stray, object) = leave_out_strays(batch, &mut keep);
+    skipped.stray += stray;
+    skipped.stray_object = skipped.stray_object.or(object);
+    keep
 }
 
 fn is_valid(positions: &[Vec3], t: [u32; 3], limits: GeometryLimits, skipped: &mut SkippedGeometry) -> bool {

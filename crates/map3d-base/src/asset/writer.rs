@@ -13,6 +13,7 @@ use twox_hash::XxHash3_64;
 use super::mapped::{FLAG_NORMALS, MESH_MAGIC, MESH_VERSION, SECTIONS};
 use super::validation::{GeometryLimits, SkippedGeometry, valid_triangles};
 use super::{AssetReport, Batch, Materials, Object};
+use crate::Reason;
 use crate::error::{Error, Result};
 use crate::file::{HEADER_BYTES, aligned, header_start};
 use crate::vec3::Box3;
@@ -133,6 +134,8 @@ impl AssetWriter {
         for (reason, count) in self.skipped.reasons() {
             report.add(reason, count, String::new);
         }
+        let name = || self.skipped.stray_object.and_then(|k| objects.get(k as usize)).map_or_else(String::new, |o| o.name.clone());
+        report.add(Reason::StrayVertex, self.skipped.stray, name);
         report.objects = objects.len() as u64;
         report.triangles = self.triangles;
         report.box_source = (!self.bounds.is_empty()).then_some([self.bounds.lo, self.bounds.hi]);

@@ -15,8 +15,10 @@ const APART_M: f64 = 10_000.0;
 const FEW_APART_M: f64 = 2_000.0;
 /// More than any terrain rises without anything in between.
 const APART_IN_HEIGHT_M: f64 = 3_000.0;
-/// Groups are one if the gap between them is less than this many times the diagonal of the larger one, or this many usual triangles.
+/// Groups are one if the gap between them is less than this many times the diagonal of their largest piece without gaps, but no more than
+/// `MOST_APART_M`, or this many usual triangles. Towns do not join by way of others.
 const APART_DIAGONALS: f64 = 3.0;
+const MOST_APART_M: f64 = 50_000.0;
 const APART_SIZES: f64 = 4.0;
 /// A triangle of more than this many usual ones is large: it belongs to a group if it lies in its reach.
 const LARGE_SIZES: f64 = 16.0;
@@ -25,6 +27,14 @@ const LARGE_M: f64 = 2048.0;
 const FEW: u64 = 200;
 /// The grid becomes coarser until there are at most this many groups to compare.
 const MAX_GROUPS: usize = 512;
+
+/// Content that belongs together.
+#[derive(Clone, Copy, Debug)]
+struct Group {
+    cell: ContentCell,
+    /// Diagonal of the largest piece whose cells touch.
+    piece_m: f64,
+}
 
 /// A group of content far from the others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -132,7 +142,8 @@ impl Content {
             cells.coarsen();
             groups = neighbours(&cells);
         }
-        self.join(&mut groups);
+        let groups = self.joined(groups);
+        let mut groups: Vec<ContentCell> = groups.into_iter().map(|g| g.cell).collect();
         let (triangles, objects) = totals(&groups);
         let share = |g: &ContentCell| g.triangles as f64 / triangles.max(1) as f64 + g.objects as f64 / objects.max(1) as f64;
         let place = |g: &ContentCell| [g.bounds.lo, g.bounds.hi].map(|p| p.map(|v| v + 0.0));
@@ -141,19 +152,22 @@ impl Content {
     }
 
     /// Joins groups until all are far from each other. Joined groups only become larger, so that the order does not matter.
-    fn join(&self, groups: &mut Vec<ContentCell>) {
-        let (size_m, totals) = (self.cells.usual_size_m(), totals(groups));
+    fn joined(&self, cells: Vec<ContentCell>) -> Vec<Group> {
+        let (size_m, totals) = (self.cells.usual_size_m(), totals(&cells));
+        let mut groups: Vec<Group> = cells.into_iter().map(|cell| Group { cell, piece_m: diagonal_m(&cell.bounds) }).collect();
         let mut k = 0;
         while k < groups.len() {
             match (k + 1..groups.len()).find(|other| are_one(&groups[k], &groups[*other], size_m, totals)) {
                 Some(other) => {
                     let joined = groups.swap_remove(other);
-                    groups[k].merge(&joined);
+                    groups[k].cell.merge(&joined.cell);
+                    groups[k].piece_m = groups[k].piece_m.max(joined.piece_m);
                     k = 0;
                 }
                 None => k += 1,
             }
         }
+        groups
     }
 }
 
@@ -161,7 +175,7 @@ fn totals(groups: &[ContentCell]) -> (u64, u64) {
     (groups.iter().map(|g| g.triangles).sum(), groups.iter().map(|g| g.objects).sum())
 }
 
-/// Returns the distance up to which other content belongs to a group, except for the least distance of all.
+/// Returns how far large triangles of a group may reach beyond it, except for the least distance of all.
 fn apart_m(size_m: f64, group: &ContentCell) -> f64 {
     (APART_SIZES * size_m).max(APART_DIAGONALS * diagonal_m(&group.bounds))
 }
@@ -170,12 +184,12 @@ fn apart_in_height_m(size_m: f64, group: &ContentCell) -> f64 {
     (APART_SIZES * size_m).max(APART_IN_HEIGHT_M).max(group.bounds.hi[2] - group.bounds.lo[2])
 }
 
-fn are_one(a: &ContentCell, b: &ContentCell, size_m: f64, (triangles, objects): (u64, u64)) -> bool {
-    let is_few = |g: &ContentCell| g.triangles * FEW <= triangles && g.objects * FEW <= objects;
-    let (distance_m, height_m) = gap_m(&a.bounds, &b.bounds);
-    let least_m = if is_few(a) || is_few(b) { FEW_APART_M } else { APART_M };
-    let apart_m = [a, b].map(|g| apart_m(size_m, g)).into_iter().fold(least_m, f64::max);
-    let apart_in_height_m = [a, b].map(|g| apart_in_height_m(size_m, g)).into_iter().fold(0.0, f64::max);
+fn are_one(a: &Group, b: &Group, size_m: f64, (triangles, objects): (u64, u64)) -> bool {
+    let is_few = |g: &Group| g.cell.triangles * FEW <= triangles && g.cell.objects * FEW <= objects;
+    let (distance_m, height_m) = gap_m(&a.cell.bounds, &b.cell.bounds);
+    let least_m = if is_few(a) || is_few(b) { FEW_APART_M } else { APART_M }.max(APART_SIZES * size_m);
+    let apart_m = [a, b].map(|g| (APART_DIAGONALS * g.piece_m).min(MOST_APART_M)).into_iter().fold(least_m, f64::max);
+    let apart_in_height_m = [a, b].map(|g| apart_in_height_m(size_m, &g.cell)).into_iter().fold(0.0, f64::max);
     distance_m <= apart_m && height_m <= apart_in_height_m
 }
 
@@ -256,6 +270,24 @@ mod tests {
     fn villages_a_few_kilometres_apart_are_one_cluster() {
         let content = content(|c| (0..5).for_each(|k| row(c, [TOWN[0], TOWN[1] + 7000.0 * f64::from(k), 500.0], 60, 20.0)));
         assert_eq!((content.clusters().len(), extent(&content, Choice::Largest)), (1, None));
+    }
+
+    #[test]
+    fn towns_do_not_join_by_way_of_others() {
+        let at_km = [0.0, 9.0, 35.0, 140.0, 560.0];
+        let content = content(|c| at_km.iter().for_each(|x| row(c, [TOWN[0] + 1000.0 * x, TOWN[1], 500.0], 60, 20.0)));
+        assert_eq!(content.clusters().iter().map(|c| c.objects).collect::<Vec<_>>(), [120, 60, 60, 60]);
+        assert!(extent(&content, Choice::Largest).is_some());
+    }
+
+    #[test]
+    fn parts_of_a_region_are_one_cluster_and_regions_far_apart_are_not() {
+        let regions = |gap_m: f64| {
+            let grid = |c: &mut ContentCells, x: f64| (0..40).for_each(|k| row(c, [x, TOWN[1] + 900.0 * f64::from(k), 500.0], 40, 900.0));
+            let content = content(|c| [TOWN[0], TOWN[0] + 36_000.0 + gap_m].iter().for_each(|x| grid(c, *x)));
+            content.clusters().len()
+        };
+        assert_eq!((regions(45_000.0), regions(100_000.0)), (1, 2));
     }
 
     #[test]
