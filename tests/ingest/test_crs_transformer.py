@@ -6,7 +6,8 @@ import pytest
 from map3d.errors import CrsError
 from map3d.geometry.crs import horizontal_crs, parse_crs
 from map3d.ingest.asset_reprojector import AssetReprojector
-from map3d.ingest.crs_transformer import CrsTransformer, choose_scene_crs
+from map3d.ingest.crs_transformer import CrsTransformer
+from map3d.ingest.scene_crs import choose_scene_crs
 
 MUNICH_UTM = (691_000.0, 5_336_000.0, 520.0)
 

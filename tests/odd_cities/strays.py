@@ -79,6 +79,18 @@ def _with_relative_numbers(line: str) -> str:
     return " ".join(["f", *(str(int(word) - 9) for word in line.split()[1:])]) if line.startswith("f") else line
 
 
+def move_polygon(path: Path, points: np.ndarray) -> Path:
+    """Replaces a wall of `house-1-2`."""
+    return _replace_positions(path, "house-1-2-5-r", np.vstack([points, points[:1]]), "%.9f")
+
+
+def move_corner(path: Path, corner: np.ndarray, *, by: bool = False) -> Path:
+    """Moves a corner of a wall of `house-1-2` to another place, or `by` so much."""
+    points = _positions(path, "house-1-2-5-r")
+    points[2] = points[2] + corner if by else corner
+    return _replace_positions(path, "house-1-2-5-r", points, "%.9f")
+
+
 def _ring(path: Path, ring: str) -> tuple[str, int, int]:
     """Returns the text of a file, and where the positions of a ring begin and end."""
     text = path.read_text()
@@ -91,7 +103,7 @@ def _positions(path: Path, ring: str) -> np.ndarray:
     return np.array([float(word) for word in text[start:end].split()]).reshape(-1, 3)
 
 
-def _replace_positions(path: Path, ring: str, points: np.ndarray) -> Path:
+def _replace_positions(path: Path, ring: str, points: np.ndarray, format: str = "%.3f") -> Path:
     text, start, end = _ring(path, ring)
-    path.write_text(text[:start] + " ".join(f"{value:.3f}" for value in points.ravel()) + text[end:])
+    path.write_text(text[:start] + " ".join(format % value for value in points.ravel()) + text[end:])
     return path

@@ -10,8 +10,8 @@ from map3d.catalogue import Workspace
 from map3d.registry import Registry
 from map3d.types import Box
 
-MUNICH = (11.5755, 48.1374)
-"""Longitude and latitude."""
+LonLat = tuple[float, float]
+MUNICH: LonLat = (11.5755, 48.1374)
 
 HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <core:CityModel xmlns:core="http://www.opengis.net/citygml/2.0" xmlns:bldg="http://www.opengis.net/citygml/building/2.0"

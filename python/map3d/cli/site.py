@@ -40,7 +40,6 @@ def command(workspace: Workspace, request: Site) -> None:
     from map3d.jobs.run_settings import RunSettings
     from map3d.publish import check_folder
     from map3d.publish.report_page import REPORT_PAGE
-    from map3d.scenes.outliers import choose_content
     from map3d.scenes.style import choose_style
     from map3d.site.steps import create_site_rendering, store_report
 
@@ -55,7 +54,6 @@ def command(workspace: Workspace, request: Site) -> None:
         if not catalogue.assets(request.name):
             click.echo(f"the scene {request.name} has no files left; {out} stays as it was published")
             return
-        choose_content(catalogue, request.name, bool(request.keep_outliers), request.cluster or 0)
         choose_style(catalogue, request.name, request.style or {"rules": []})
         built = build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=memory)
         print_extents(workspace, catalogue, request.name, was_built=built is not None)
@@ -76,6 +74,7 @@ def command(workspace: Workspace, request: Site) -> None:
 
 
 def _update_files(workspace: Workspace, catalogue: Catalogue, request: Site) -> "ImportSummary":
+    from map3d.scenes.outliers import choose_content
     from map3d.site.files import update_files
     from map3d.site.steps import site_files
 
@@ -86,6 +85,7 @@ def _update_files(workspace: Workspace, catalogue: Catalogue, request: Site) -> 
             bar.update(task, description=f"importing {name}: {how_far}" if how_far else f"importing {name}", completed=done, total=total)
 
         summary = update_files(workspace, catalogue, site_files(request), report)
+    choose_content(catalogue, request.name, bool(request.keep_outliers), request.cluster or 0)
     _print_summary(summary)
     _print_problems(workspace, catalogue, request.name)
     return summary

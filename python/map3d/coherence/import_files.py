@@ -6,6 +6,7 @@ from pathlib import Path
 
 from map3d.catalogue import AssetRecord, Catalogue, Workspace
 from map3d.catalogue.scene_lock import scene_lock
+from map3d.coherence.plan import plan_import
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.formats.raster import RASTER
 from map3d.ingest.asset_removal import removed_files
@@ -88,7 +89,8 @@ def _import_files(
     is_single = len(sources) + len(result.failed) == 1
     known = _known_assets(workspace, catalogue, scene) if options.skip_unchanged else {}
     grids = ReliefGrids()
-    waiting, number = list(sources), 0
+    plan = plan_import(sources, options, catalogue.scene(scene))
+    waiting, number = list(plan.sources), 0
     with ParserProcess() as parser:
         while waiting or grids.is_waiting:
             if grids.is_waiting and (not waiting or waiting[0].format == RASTER.name):
@@ -100,12 +102,13 @@ def _import_files(
             show = _show(progress, source.paths[0].name, number, number + len(waiting) + 1)
             show(None)
             number += 1
+            chosen = plan.options(source, options)
             try:
-                if _is_unchanged(known.get(source.name), source, options):
+                if _is_unchanged(known.get(source.name), source, chosen):
                     result.unchanged.append(source.name)
                     grids.collect(known[source.name].report.get("grids", ()))
                 else:
-                    done = import_file(workspace, catalogue, scene, source, options, show, parser=parser)
+                    done = import_file(workspace, catalogue, scene, source, chosen, show, parser=parser)
                     result.imported.append(done)
                     grids.collect(done.report.get("grids", ()))
             except OnlyGrids as found:

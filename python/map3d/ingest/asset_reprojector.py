@@ -11,27 +11,37 @@ from pyproj.crs import CompoundCRS
 from map3d.catalogue import SceneCrs
 from map3d.errors import CrsError
 from map3d.formats import find_format
-from map3d.geometry.crs import has_ellipsoidal_heights, is_local, parse_crs, vertical_crs, vertical_crs_name
+from map3d.geometry.crs import has_ellipsoidal_heights, horizontal_crs, is_local, is_metric, parse_crs, vertical_crs, vertical_crs_name
+from map3d.ingest.axis_order import is_north_first
 from map3d.ingest.coordinate_check import CoordinateCheck
-from map3d.ingest.crs_transformer import CrsTransformer, Points, choose_scene_crs
-from map3d.ingest.scene_crs import LOCAL, to_scene_crs
+from map3d.ingest.crs_transformer import CrsTransformer, Points
+from map3d.ingest.evidence import Evidence
+from map3d.ingest.exactness import better_words, transformation_findings
+from map3d.ingest.findings import finding
+from map3d.ingest.height_unit import ChosenUnit, choose_height_unit
+from map3d.ingest.scene_crs import LOCAL, choose_scene_crs, length_error, stretches, to_scene_crs
 from map3d.messages import message
+from map3d.requests.reading import Axes
 
 
 class AssetReprojector:
     """Transforms the positions of one asset to the scene's CRS. While the scene has none, the first positions determine it."""
 
-    def __init__(self, format: str, asset_crs: str | None, scene_crs: str | None, *, stated: bool = False) -> None:
-        """`asset_crs`: the name given by the user (`stated`) or the file, or None; `scene_crs`: WKT, "local", or None while the scene has no CRS.
+    def __init__(self, format: str, asset_crs: str | None, scene_crs: str | None, *, stated: bool = False, evidence: Evidence | None = None) -> None:
+        """`asset_crs`: the name given by the user (`stated`) or the file, or None; `scene_crs`: WKT, "local", or None while the scene has no CRS;
+        `evidence`: what else is known of the document.
 
         Raises CrsError if the two are incompatible.
         """
+        self._evidence, self._unit, self._stretched = evidence or Evidence(), ChosenUnit(), list[dict[str, Any]]()
         self._format, self._asset_crs = format, asset_crs
         self._scene_is_local = scene_crs is not None and is_local(scene_crs)
         self._target = None if scene_crs is None or self._scene_is_local else CRS.from_user_input(scene_crs)
         self._source = None if asset_crs is None or is_local(asset_crs) else parse_crs(asset_crs)
         self._transformer: CrsTransformer | None = None
-        self._check = None if self._source is None else CoordinateCheck(self._source, asset_crs or "", stated=stated, target=self._target)
+        self._check = None
+        if self._source is not None:
+            self._check = CoordinateCheck(self._source, asset_crs or "", stated=stated, target=self._target, evidence=self._evidence)
         if self._source is not None and self._scene_is_local:
             raise CrsError(
                 f"the file is in {self._source.name}, but the scene is in local metres; "
@@ -45,9 +55,19 @@ class AssetReprojector:
             return points
         points = self._check.ordered(np.asarray(points, dtype=np.float64))
         if self._transformer is None:
-            self._target = self._target or _with_vertical_crs(choose_scene_crs(self._source, points), self._source)
-            self._transformer = CrsTransformer(self._source, self._target)
+            self._transformer = self._choose_transformer(self._source, self._check, points)
         return self._transformer.to_world(points)
+
+    def _choose_transformer(self, source: CRS, check: CoordinateCheck, points: Points) -> CrsTransformer:
+        place = None if check.place is None else (check.place.lon, check.place.lat)
+        self._target = target = self._target or _with_vertical_crs(choose_scene_crs(source, points, check.middle), source)
+        for crs, code in ((target, "scene-crs-stretches"), (source, "crs-stretches")):
+            if place is not None and is_metric(crs) and stretches(crs, *place):
+                factor = round(1.0 + length_error(crs, *place), 4)
+                self._stretched.append(finding(code, 1, name=str(horizontal_crs(crs).name), factor=factor, scene=str(horizontal_crs(target).name)))
+                break
+        self._unit = choose_height_unit(source, self._asset_crs or "", self._evidence)
+        return CrsTransformer(source, target, place, self._unit.metres)
 
     def transforms_to_world(self, transforms: NDArray[np.float64]) -> NDArray[np.float64]:
         """Converts (m, 12) prototype-to-source transforms to prototype-to-world."""
@@ -82,6 +102,26 @@ class AssetReprojector:
     def findings(self) -> list[dict[str, Any]]:
         """Returns what is odd about the coordinates, as findings of a report."""
         return [] if self._check is None else self._check.findings
+
+    @property
+    def notes(self) -> list[dict[str, Any]]:
+        """Returns what is worth knowing about their transformation and units, as findings of a report."""
+        exactness = [] if self._transformer is None else transformation_findings(self._transformer.transformation, self.report)
+        return [*self._stretched, *self._unit.findings, *exactness]
+
+    @property
+    def axes(self) -> Axes:
+        """The order of axes of the coordinates; "auto" until some are transformed, and where the name of the CRS leaves no doubt."""
+        if self._source is None or self._check is None:
+            return "auto"
+        horizontal = horizontal_crs(self._source)
+        in_doubt = is_north_first(horizontal) and not (horizontal.is_geographic and self._check.axes == "north-east")
+        return self._check.axes if in_doubt else "auto"
+
+    @property
+    def better(self) -> str:
+        """The words about a better transformation that lacks a grid, empty without one."""
+        return "" if self._transformer is None else better_words(self._transformer.transformation)
 
     def _check_crs_is_optional(self) -> None:
         if self._asset_crs is None and find_format(self._format).has_crs and not self._scene_is_local:

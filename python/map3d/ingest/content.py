@@ -64,12 +64,17 @@ def find_content(folders: Sequence[Path], origin: Vec3, options: Mapping[str, An
 
 
 def content_centre(workspace: Workspace, catalogue: Catalogue, scene: str) -> Vec3 | None:
-    """Returns the centre of the largest group of content of a scene, in world coordinates; None if the scene is empty."""
-    origin = catalogue.scene(scene).origin
-    clusters = () if origin is None else find_content([workspace.asset_folder(scene, a.name) for a in catalogue.assets(scene)], origin, {}).clusters
+    """Returns the centre of the group of content that a build of the scene keeps, in world coordinates: the chosen one, else the largest; None if the
+    scene is empty."""
+    record = catalogue.scene(scene)
+    if record.origin is None:
+        return None
+    folders = [workspace.asset_folder(scene, asset.name) for asset in catalogue.assets(scene)]
+    clusters = find_content(folders, record.origin, {}).clusters
     if not clusters:
         return None
-    low, high = clusters[0].box
+    number = record.options.get(CLUSTER) or 1
+    low, high = clusters[number - 1 if number <= len(clusters) else 0].box
     return ((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2)
 
 

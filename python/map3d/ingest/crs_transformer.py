@@ -7,12 +7,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 from pyproj import CRS, Transformer
-from pyproj.aoi import AreaOfInterest
-from pyproj.database import query_utm_crs_info
 from pyproj.transformer import TransformerGroup
 
-from map3d.errors import CrsError
-from map3d.geometry.crs import horizontal_crs, is_metric, vertical_crs, vertical_crs_name, vertical_unit_m
+from map3d.geometry.crs import horizontal_crs, vertical_crs, vertical_crs_name, vertical_unit_m
+from map3d.geometry.transformations import LonLat, find_transformation
 
 Points = NDArray[np.float64]
 """(n, 3)."""
@@ -28,20 +26,20 @@ class CrsTransformer:
     Files write x, y as east, north if projected, and in the authority's axis order if geographic.
     """
 
-    def __init__(self, source: CRS, target: CRS) -> None:
-        """`target`: the scene's CRS, projected in metres, with its vertical part if known. Raises CrsError without a transformation."""
+    def __init__(self, source: CRS, target: CRS, place: LonLat | None = None, height_unit_m: float | None = None) -> None:
+        """`target`: the scene's CRS, projected in metres, with its vertical part if known; `place`: of the points; `height_unit_m`: that of the
+        heights if `source` does not state it. Raises CrsError without a transformation."""
         self._source, self._target = horizontal_crs(source), horizontal_crs(target)
-        self._height_unit_m = vertical_unit_m(source)
+        self._height_unit_m = vertical_unit_m(source) if height_unit_m is None else height_unit_m
         self._same_crs = self._source.equals(self._target, ignore_axis_order=True)
         self._zone_offset_m = _UTM_ZONES.get(self._source.to_epsg() or 0, 0) * 1e6
         self._zone_prefixed_points = 0
-        self._operations = None if self._same_crs else _find_operations(self._source, self._target)
-        self._transformer = None if self._operations is None else self._operations.transformers[0]
+        self.transformation = find_transformation(source, target, place)
         self._height_transformer = _find_height_transformer(source, target)
         self._description: dict[str, Any] = {
             "from": str(source.name),
             "to": str(self._target.name),
-            **self._describe_operation(),
+            **self.transformation.report,
             "heights": self._describe_heights(source, target),
         }
 
@@ -55,7 +53,7 @@ class CrsTransformer:
         local = self._remove_zone_prefix(_east_first(self._source, np.asarray(points, dtype=np.float64)))
         if self._same_crs and self._height_transformer is None and self._height_unit_m == 1.0:
             return np.ascontiguousarray(local)
-        x, y = (local[:, 0], local[:, 1]) if self._transformer is None else self._transformer.transform(local[:, 0], local[:, 1])
+        x, y = self.transformation(local[:, 0], local[:, 1])
         if self._height_transformer is None:
             z = local[:, 2] * self._height_unit_m
         else:
@@ -93,19 +91,6 @@ class CrsTransformer:
         out[prefixed, 0] -= self._zone_offset_m
         return out
 
-    def _describe_operation(self) -> dict[str, Any]:
-        if self._transformer is None or self._operations is None:
-            return {"operation": "none: same CRS", "accuracy_m": 0.0, "ballpark": False}
-        accuracy = self._transformer.accuracy
-        description = {
-            "operation": self._transformer.description,
-            "accuracy_m": accuracy if accuracy is not None and accuracy >= 0 else None,
-            "ballpark": "ballpark" in self._transformer.description.lower(),
-        }
-        if not self._operations.best_available and self._operations.unavailable_operations:
-            description["better_but_not_installed"] = self._operations.unavailable_operations[0].name
-        return description
-
     def _describe_heights(self, source: CRS, target: CRS) -> str:
         own, wanted = vertical_crs_name(source), vertical_crs_name(target)
         if self._height_transformer is not None:
@@ -115,47 +100,12 @@ class CrsTransformer:
         return f"unchanged ({own or 'unknown datum'}): no grid to {wanted} is installed, so they may be off by metres"
 
 
-def choose_scene_crs(source: CRS, points: Points) -> CRS:
-    """Chooses the scene's CRS by its first asset: the asset's own if projected in metres, else the UTM zone of its centre. Raises CrsError."""
-    if is_metric(source):
-        return source
-    horizontal = horizontal_crs(source)
-    finite = points[np.isfinite(points).all(axis=1)]
-    if len(finite) == 0:
-        raise CrsError("cannot choose a UTM zone: the file has no finite coordinates; set the scene's CRS with --crs")
-    x, y, _ = _east_first(horizontal, (finite.min(axis=0, keepdims=True) + finite.max(axis=0, keepdims=True)) / 2)[0]
-    lon, lat = (x, y) if horizontal.is_geographic else Transformer.from_crs(horizontal, 4326, always_xy=True).transform(x, y)
-    if not (-180 <= lon <= 180 and -80 <= lat <= 84):
-        raise CrsError(
-            f"longitude {lon:g}, latitude {lat:g} is outside all UTM zones; set the scene's CRS with --crs, or the file's if its own is wrong"
-        )
-    return _find_utm_zone(horizontal, lon, lat)
-
-
 def _is_north_first(horizontal: CRS) -> bool:
     return bool(horizontal.axis_info[0].direction == "north")
 
 
 def _east_first(horizontal: CRS, points: Points) -> Points:
     return points[:, [1, 0, 2]] if horizontal.is_geographic and _is_north_first(horizontal) else points
-
-
-def _find_utm_zone(horizontal: CRS, lon: float, lat: float) -> CRS:
-    """Prefers the zone on the datum of `horizontal`, else takes the one on WGS 84."""
-    point = AreaOfInterest(lon, lat, lon, lat)
-    datum = horizontal.geodetic_crs.name if horizontal.geodetic_crs is not None else None
-    zones = query_utm_crs_info(datum_name=datum, area_of_interest=point) or query_utm_crs_info(datum_name="WGS 84", area_of_interest=point)
-    plain = [zone for zone in zones if zone.name.startswith(f"{datum} / UTM zone") and not zone.name.endswith(")")] or zones
-    return CRS.from_epsg(int(min(plain, key=lambda zone: int(zone.code)).code))
-
-
-def _find_operations(source: CRS, target: CRS) -> TransformerGroup:
-    """Returns the installed operations, most accurate first; ballpark operations only if there is no other."""
-    for ballpark in (False, True):
-        group = _query_operations(source, target, ballpark)
-        if group.transformers:
-            return group
-    raise CrsError(f"no transformation from {source.name} to {target.name} is known; name another CRS with --crs")
 
 
 def _find_height_transformer(source: CRS, target: CRS) -> Transformer | None:

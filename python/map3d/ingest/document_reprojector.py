@@ -11,7 +11,9 @@ from map3d.errors import CrsError
 from map3d.geometry.crs import horizontal_crs, parse_crs, vertical_crs_name
 from map3d.ingest.asset_reprojector import AssetReprojector
 from map3d.ingest.crs_transformer import Points
+from map3d.ingest.evidence import Evidence
 from map3d.ingest.findings import finding, findings
+from map3d.requests.reading import Axes
 
 _MAX_NAME: Final = 80
 
@@ -29,9 +31,20 @@ class DocumentReprojector:
     A part in a CRS that is not usable is skipped and counted, unless it is the document's own, which raises CrsError.
     """
 
-    def __init__(self, format: str, document_crs: str | None, scene_crs: str | None, *, stated: str | None = None, strict: bool = False) -> None:
+    def __init__(
+        self,
+        format: str,
+        document_crs: str | None,
+        scene_crs: str | None,
+        *,
+        stated: str | None = None,
+        strict: bool = False,
+        evidence: Evidence | None = None,
+    ) -> None:
         """`document_crs`: the name in the file, or None; `stated`: the user's, which counts for all parts; `scene_crs`: WKT, "local",
-        or None while the scene has no CRS; `strict`: the first part that would be skipped raises CrsError."""
+        or None while the scene has no CRS; `strict`: the first part that would be skipped raises CrsError; `evidence`: what else is known of the
+        document."""
+        self._evidence = evidence
         self._format, self._scene_crs, self._stated, self._strict = format, scene_crs, stated, strict
         self._document_crs = stated or document_crs
         self._names: dict[str | None, str | None] = {}
@@ -60,6 +73,11 @@ class DocumentReprojector:
         """The CRS for a scene that has none; None before any position was transformed."""
         first = self._first
         return None if first is None else first.proposed_crs
+
+    def axes(self, name: str | None) -> Axes:
+        """Returns the order of axes of the parts in a CRS that the document names; "auto" if no part told it."""
+        known = self._reprojectors.get(self._names.get(name))
+        return "auto" if known is None else known.axes
 
     def report(self, counts: Mapping[str, Any]) -> dict[str, Any]:
         """Returns the core's report with what is skipped, odd or worth knowing about coordinates. Raises CrsError if all parts are skipped, and for
@@ -112,10 +130,14 @@ class DocumentReprojector:
             first = self._first
             proposed = None if first is None else first.proposed_crs
             scene = self._scene_crs or (None if proposed is None else proposed.wkt or "local")
-            self._reprojectors[key] = AssetReprojector(self._format, key, scene, stated=self._stated is not None)
+            self._reprojectors[key] = AssetReprojector(self._format, key, scene, stated=self._stated is not None, evidence=self._evidence)
         return self._reprojectors[key]
 
     def _notes(self) -> list[dict[str, Any]]:
+        first = self._first
+        return [*([] if first is None else first.notes), *self._notes_of_parts()]
+
+    def _notes_of_parts(self) -> list[dict[str, Any]]:
         if self._stated:
             distinct: list[str] = []
             for name in self._names:
@@ -146,7 +168,7 @@ def _describe(reprojector: AssetReprojector) -> str:
     accuracy = report.get("accuracy_m")
     exact = "accuracy unknown" if accuracy is None or report.get("ballpark") else f"accurate to {accuracy:g} m"
     heights = f"; heights {report['heights']}" if "heights" in report else ""
-    return f"from {report['from']} to {report['to']}, {exact}{heights}"
+    return f"from {report['from']} to {report['to']}, {exact}{reprojector.better}{heights}"
 
 
 def _short(name: str | None) -> str:

@@ -58,7 +58,9 @@ def import_inputs(source: SourceDocument, options: ImportOptions) -> ImportInput
         limits = options.limits(source.data_paths, source.format)
     except OSError as error:
         raise NotFound(f"{error.filename or source.paths[0]}: cannot read the file: {error.strerror or error}") from error
-    return ImportInputs(files, {"crs": options.crs, **options.reader_options(source.format, limits)}, find_format(source.format).version)
+    format = find_format(source.format)
+    placing = {} if format.is_grouped else options.placing
+    return ImportInputs(files, {"crs": options.crs, **placing, **options.reader_options(source.format, limits)}, format.version)
 
 
 def _text(value: Any) -> str:

@@ -8,7 +8,7 @@ from typing import Any, Final
 from map3d.formats import find_format
 from map3d.formats.gzip_file import content_bytes
 from map3d.formats.source_format import GIB
-from map3d.requests.reading import AddFiles, FormatOptions
+from map3d.requests.reading import AddFiles, Axes, FormatOptions
 from map3d.subprocess import Limits
 
 BIG_FILE_BYTES: Final = 100_000_000
@@ -18,9 +18,16 @@ OPEN_FILES: Final = 256
 @dataclass(frozen=True, kw_only=True)
 class ImportOptions(AddFiles):
     """The request, and what only this host's programs decide. `virtual_rasters`: reads virtual rasters (VRT), which name other files; only for paths
-    that the operator of this host gave."""
+    that the operator of this host gave. `followed_axes`: the order of axes of the other files, for one that does not tell its own."""
 
     virtual_rasters: bool = False
+    followed_axes: Axes = "auto"
+
+    @property
+    def placing(self) -> dict[str, str]:
+        """The options by which coordinates are read, as far as they are not the default: an asset records only these."""
+        known = {"axes": self.axes, "followed_axes": self.followed_axes, "height_unit": self.height_unit}
+        return {name: value for name, value in known.items() if value != "auto"}
 
     @classmethod
     def of(cls, request: FormatOptions, **more: Any) -> "ImportOptions":

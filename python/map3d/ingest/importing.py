@@ -135,6 +135,7 @@ def _parse(
         "folder": str(draft.absolute()),
         "reader": options.reader_options(source.format, limits) | _folder_options(source),
         "crs": options.crs,
+        "placing": options.placing,
         "scene_crs": _crs_text(record.crs),
         "scene_origin": record.origin,
         "checkpoints": None if checkpoints is None else str(checkpoints.absolute()),
@@ -237,7 +238,7 @@ def _check_distance(source: SourceDocument, boxes: list[Box | None], origin: Vec
     for box in boxes:
         if box is not None and max(abs(corner[k] - origin[k]) for corner in box for k in range(3)) > MAX_FROM_ORIGIN_M:
             raise LimitExceeded(
-                f"{source.paths[0]}: content at {box[0]} is more than {MAX_FROM_ORIGIN_M:g} m from the scene's origin {origin}; "
+                f"{source.paths[0]}: content at {box[0]} is more than {MAX_FROM_ORIGIN_M / 1000:,.0f} km from the scene's origin {origin}; "
                 "check the file's CRS (--crs)"
             )
 

@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from map3d import _core
+from map3d.formats import find_format
 from map3d.ingest.document_reprojector import DocumentReprojector
+from map3d.ingest.document_sample import DocumentSample, read_sample
+from map3d.ingest.evidence import Evidence
 from map3d.ingest.findings import finding
 from map3d.ingest.texture_places import transform_positions
 from map3d.ingest.upright_check import UprightCheck
@@ -25,13 +28,19 @@ def open_document_parser(_setup: Mapping[str, Any]) -> Handler:
 
 
 def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
-    """`request`: {"path", "format", "folder", "reader": options of the core's Reader, "crs": the user's choice or None, "scene_crs": WKT, "local",
-    or None while the scene has no CRS}. Returns {"report", "crs": the CRS proposed for the scene, None if nothing determines it}."""
+    """`request`: {"path", "format", "folder", "reader": options of the core's Reader, "crs": the user's choice or None, "placing": members of
+    `Evidence`, "scene_crs": WKT, "local", or None while the scene has no CRS}. Returns {"report", "crs": the CRS proposed for the scene, None if
+    nothing determines it}."""
     # Where the user states the CRS of all parts, textures are in that one, too.
     transform = None if request["crs"] else transform_positions
     reader = _core.Reader(request["path"], request["format"], json.dumps(request["reader"]), transform)
     strict = bool(request["reader"].get("strict"))
-    reprojector = DocumentReprojector(request["format"], reader.srs_name, request["scene_crs"], stated=request["crs"], strict=strict)
+    evidence = Evidence(
+        **request["placing"], sample=read_sample(Path(request["path"])) if find_format(request["format"]).has_crs else DocumentSample()
+    )
+    reprojector = DocumentReprojector(
+        request["format"], reader.srs_name, request["scene_crs"], stated=request["crs"], strict=strict, evidence=evidence
+    )
     writer = _core.AssetWriter(request["folder"])
     upright, triangles, reported = UprightCheck(), 0, 0
     for batch in reader:
@@ -57,7 +66,7 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
     report["findings"] += hints
     grids = json.loads(reader.grids())
     if grids:
-        report["grids"] = grids
+        report["grids"] = [grid | ({} if (axes := reprojector.axes(grid["crs"])) == "auto" else {"axes": axes}) for grid in grids]
         names = ", ".join(sorted({Path(grid["file"]).name for grid in grids})[:_MAX_NAMES])
         report["findings"].append(finding("relief-raster-read-as-terrain", len(grids), names))
     proposed = reprojector.proposed_crs

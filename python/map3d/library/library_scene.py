@@ -51,6 +51,8 @@ class LibraryScene:
         *files: str | PathLike[str],
         crs: str | None = None,
         name: str | None = None,
+        axes: str = "auto",
+        height_unit: str = "auto",
         up: str = "z",
         split: str = "file",
         theme: str | None = None,
@@ -74,6 +76,8 @@ class LibraryScene:
         options = ImportOptions(
             crs=crs,
             name=name,
+            axes=axes,
+            height_unit=height_unit,
             up=up,
             split=split,
             theme=theme,

@@ -1,9 +1,14 @@
 """Requests that read files: add files, inspect."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final, Literal, get_args
 
 from map3d.requests.param import param
+
+Axes = Literal["auto", "east-north", "north-east"]
+AXES: Final[tuple[Axes, ...]] = get_args(Axes)
+HeightUnit = Literal["auto", "m", "ft", "us-ft"]
+HEIGHT_UNITS: Final[tuple[HeightUnit, ...]] = get_args(HeightUnit)
 
 
 def crs_param() -> Any:
@@ -18,6 +23,18 @@ def crs_param() -> Any:
 class FormatOptions:
     """What to read of a format."""
 
+    axes: str = param(
+        "auto",
+        help="Order of the first two numbers of positions; longitude counts as east. auto: by what the files show.",
+        label="Order of the axes",
+        choices=AXES,
+    )
+    height_unit: str = param(
+        "auto",
+        help="Unit of heights where the coordinate system does not state it. auto: by what the files show.",
+        label="Unit of heights",
+        choices=HEIGHT_UNITS,
+    )
     up: str = param("z", help="OBJ: the axis that points up.", label="OBJ: upward axis", choices=("y", "z"))
     split: str = param("file", help="OBJ: the part that becomes one object.", label="OBJ: one object per", choices=("file", "group"))
     theme: str | None = param(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
+from map3d.coherence.plan import ImportPlan, plan_import
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.formats.raster import RASTER
 from map3d.ingest.asset_removal import remove_assets, removed_files
@@ -71,9 +72,11 @@ class _Update:
         self._root = files.folder.resolve()
         self._summary = ImportSummary()
         self._grids = ReliefGrids()
+        self._plan = ImportPlan((), {})
 
     def run(self, report: OnSource) -> ImportSummary:
-        sources = self._find_sources()
+        self._plan = plan_import(self._find_sources(), self._files.options, self._catalogue.scene(self._files.scene.name))
+        sources = self._plan.sources
         leaving = list(self._leaving(sources))
         self._check_vanished(leaving)
         self._summary.elsewhere.extend(name for name, asset in self._assets.items() if not self._is_inside(asset) and name not in _names(sources))
@@ -144,16 +147,16 @@ class _Update:
                 )
 
     def _import_if_changed(self, source: SourceDocument, parser: ParserProcess, show: OnProgress) -> None:
-        asset = self._assets.get(source.name)
+        asset, options = self._assets.get(source.name), self._plan.options(source, self._files.options)
         try:
             reason = None
             if asset is not None:
-                reason = import_inputs(source, self._files.options).changes(asset)
+                reason = import_inputs(source, options).changes(asset)
                 if reason is None:
                     self._keep(asset, source)
                     self._grids.collect(asset.report.get("grids", ()))
                     return
-            done = import_file(self._workspace, self._catalogue, self._files.scene.name, source, self._files.options, show, parser=parser)
+            done = import_file(self._workspace, self._catalogue, self._files.scene.name, source, options, show, parser=parser)
             self._grids.collect(done.report.get("grids", ()))
         except OnlyGrids as found:
             self._grids.collect(found.grids)

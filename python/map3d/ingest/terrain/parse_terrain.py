@@ -13,9 +13,8 @@ from rasterio.errors import RasterioError
 
 from map3d.errors import CrsError, ImportFailed
 from map3d.geometry.crs import is_local, parse_crs
-from map3d.ingest.crs_transformer import choose_scene_crs
 from map3d.ingest.findings import finding
-from map3d.ingest.scene_crs import LOCAL, to_scene_crs
+from map3d.ingest.scene_crs import LOCAL, choose_scene_crs, to_scene_crs
 from map3d.ingest.terrain.placed_rasters import PlacedRasters
 from map3d.ingest.terrain.raster_georeference import open_raster
 from map3d.ingest.terrain.raster_groups import split_far

@@ -20,6 +20,7 @@ from rasterio.errors import NotGeoreferencedWarning
 from map3d.errors import CrsError, ImportFailed
 from map3d.geometry.crs import is_local, parse_crs
 from map3d.ingest.coordinate_check import CoordinateCheck
+from map3d.ingest.evidence import Evidence
 from map3d.ingest.findings import finding
 from map3d.ingest.terrain.raster_georeference import Array, PlaneTransformer, find_driver, own_crs
 from map3d.ingest.virtual_raster import check_virtual_raster
@@ -115,7 +116,8 @@ def _place_of(grid: Mapping[str, Any], stated_crs: str | None) -> _PixelTransfor
         last = first + column * (grid["columns"] - 1) + row * (grid["rows"] - 1)
         points = np.column_stack([np.array([first, first + column, first + row, last]), np.zeros(4)])
         try:
-            ordered = CoordinateCheck(crs, name or "", stated=stated_crs is not None).ordered(points)[:, :2]
+            evidence = Evidence(axes=grid.get("axes", "auto"))
+            ordered = CoordinateCheck(crs, name or "", stated=stated_crs is not None, evidence=evidence).ordered(points)[:, :2]
         except CrsError as error:
             raise CrsError(f"RasterRelief: {error}") from error
         if crs.is_geographic and crs.axis_info[0].direction == "north":

@@ -14,6 +14,7 @@ from rasterio.errors import NotGeoreferencedWarning, RasterioError
 from map3d.errors import CrsError, ImportFailed, NotFound
 from map3d.formats.raster import RASTER_FORMATS, VIRTUAL_DRIVER, VIRTUAL_REFUSED, find_raster_format, is_virtual_raster
 from map3d.geometry.crs import horizontal_crs, is_local, parse_crs
+from map3d.geometry.transformations import LonLat, Transformation, find_transformation
 from map3d.ingest.virtual_raster import is_checked
 
 Array = NDArray[np.float64]
@@ -74,6 +75,17 @@ def raster_crs(dataset: Any, scene_crs: CRS | None, stated_crs: str | None = Non
     return scene_crs if own is None or scene_crs is None else horizontal_crs(own)
 
 
+def place_of(dataset: Any, crs: CRS | None) -> LonLat | None:
+    """Returns longitude and latitude of the middle of a raster; None if it is nowhere on Earth."""
+    if crs is None:
+        return None
+    a, b, c, d, e, f = dataset.transform[:6]
+    column, row = dataset.width / 2, dataset.height / 2
+    middle = c + column * a + row * b, f + column * d + row * e
+    lon, lat = Transformer.from_crs(crs, "EPSG:4326", always_xy=True).transform(*middle)
+    return (float(lon), float(lat)) if abs(lon) <= 360.0 and abs(lat) <= 90.0 else None
+
+
 class RasterGeoreference:
     """Converts between pixel positions (row, column; 0 is the upper or left edge) and the plane of the raster's CRS."""
 
@@ -94,23 +106,16 @@ class RasterGeoreference:
 class PlaneTransformer:
     """Transforms x and y between two CRSs; infinite outside the target's range. Without either CRS, coordinates stay unchanged."""
 
-    def __init__(self, source: CRS | None, target: CRS | None) -> None:
-        """Raises CrsError if no transformation is known."""
-        self._transformer: Transformer | None = None
-        target = None if target is None else horizontal_crs(target)
-        if source is None or target is None or source.equals(target):
-            return
-        try:
-            self._transformer = Transformer.from_crs(source, target, always_xy=True)
-        except ProjError as error:
-            raise CrsError(f"no transformation from {source.name} to {target.name} is known; choose another scene CRS with --crs: {error}") from error
+    def __init__(self, source: CRS | None, target: CRS | None, place: LonLat | None = None) -> None:
+        """`place`: of the raster. Raises CrsError if no transformation is known."""
+        self.transformation: Transformation | None = None
+        if source is not None and target is not None and not source.equals(horizontal_crs(target)):
+            self.transformation = find_transformation(source, target, place)
 
     @property
-    def description(self) -> str:
-        return "none: same CRS" if self._transformer is None else str(self._transformer.description)
+    def report(self) -> dict[str, Any]:
+        """Returns what import reports say of it."""
+        return {"operation": "none: same CRS"} if self.transformation is None else self.transformation.report
 
     def __call__(self, x: Array, y: Array) -> tuple[Array, Array]:
-        if self._transformer is None:
-            return x, y
-        east, north = self._transformer.transform(x, y)
-        return np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)
+        return (x, y) if self.transformation is None else self.transformation(x, y)

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from pyproj import CRS
 
-from map3d.ingest.terrain.raster_georeference import PlaneTransformer, RasterGeoreference, open_raster, raster_crs
+from map3d.ingest.terrain.raster_georeference import PlaneTransformer, RasterGeoreference, open_raster, place_of, raster_crs
 from map3d.ingest.terrain.raster_placement import NEAR_M
 
 Bounds = tuple[float, float, float, float]
@@ -33,7 +33,7 @@ def _bounds(path: Path, target: CRS | None, stated_crs: str | None) -> Bounds:
     with open_raster(path) as raster:
         crs = raster_crs(raster, target, stated_crs)
         rows, columns = (np.array([0.0, 0.0, 1.0, 1.0]) * raster.height, np.array([0.0, 1.0, 0.0, 1.0]) * raster.width)
-        x, y = PlaneTransformer(crs, target)(*RasterGeoreference(raster, crs).plane_from_pixels(rows, columns))
+        x, y = PlaneTransformer(crs, target, place_of(raster, crs))(*RasterGeoreference(raster, crs).plane_from_pixels(rows, columns))
     return (float(np.min(x)), float(np.min(y)), float(np.max(x)), float(np.max(y)))
 
 

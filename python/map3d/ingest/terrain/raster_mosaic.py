@@ -24,7 +24,7 @@ from rasterio.windows import Window
 from map3d.errors import ImportFailed, LimitExceeded
 from map3d.geometry.crs import horizontal_crs
 from map3d.ingest.terrain.orthophoto import Colours, Mask, Orthophoto, find_stretch, sample_values
-from map3d.ingest.terrain.raster_georeference import Array, PlaneTransformer, RasterGeoreference, open_raster, own_crs
+from map3d.ingest.terrain.raster_georeference import Array, PlaneTransformer, RasterGeoreference, open_raster, own_crs, place_of
 from map3d.ingest.terrain.vertex_grid import RasterHeightField, read_metres
 
 OPEN_RASTERS: Final = 32
@@ -152,9 +152,11 @@ class RasterMosaic:
             t, same_crs = raster.transform, own is None or self.crs is None or own.equals(self.crs, ignore_axis_order=True)
             if same_crs and t.b == t.d == 0.0 and t.a > 0.0 > t.e and math.isclose(t.a, -t.e, rel_tol=_SAME_SIZE):
                 return t, raster.width, raster.height, True
-            to_mosaic = PlaneTransformer(own, self.crs)
+            to_mosaic = PlaneTransformer(own, self.crs, place_of(raster, own))
             edges = [to_mosaic(*_edge(raster)), to_mosaic(*_centre_pixel(raster))]
-        if not all(np.isfinite(edge).all() for edge in edges):
+        # GDAL resamples, and knows no transformations in several steps.
+        in_steps = to_mosaic.transformation is not None and len(to_mosaic.transformation.steps) > 1
+        if in_steps or not all(np.isfinite(edge).all() for edge in edges):
             raise ImportFailed(f"{path}: cannot be transformed to the CRS of the first raster; import it on its own")
         (x, y), (px, py) = edges
         pixel = float(min(np.hypot(px[1] - px[0], py[1] - py[0]), np.hypot(px[2] - px[0], py[2] - py[0])))

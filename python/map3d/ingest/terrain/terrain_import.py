@@ -187,9 +187,9 @@ def _report(rasters: TerrainRasters, counts: dict[str, Any], content: _TerrainCo
     return {
         **counts,
         "format": CLASS,
-        "findings": [*counts.get("findings", []), *rasters.findings(), *counted],
+        "findings": [*counts.get("findings", []), *rasters.findings(), *counted, *rasters.exactness()],
         "crs": rasters.crs_wkt,
-        "projection": {"operation": rasters.scene_from_base.description, "heights": "unchanged"},
+        "projection": {**rasters.scene_from_base.report, "heights": "unchanged"},
     }
 
 

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from pyproj import CRS
 
 from map3d.errors import LimitExceeded
-from map3d.geometry.crs import vertical_unit_m
+from map3d.geometry.crs import horizontal_crs, vertical_unit_m
+from map3d.ingest.exactness import transformation_findings
 from map3d.ingest.findings import finding
 from map3d.ingest.terrain.orthophoto import ALIGN_PX, MARGIN_PX, Orthophoto
-from map3d.ingest.terrain.raster_georeference import PlaneTransformer, RasterGeoreference, open_raster, own_crs, raster_crs
+from map3d.ingest.terrain.raster_georeference import PlaneTransformer, RasterGeoreference, open_raster, own_crs, place_of, raster_crs
 from map3d.ingest.terrain.raster_mosaic import MosaicHeightField, MosaicPhoto, RasterMosaic
 from map3d.ingest.terrain.terrain_options import TerrainOptions
 from map3d.ingest.terrain.vertex_grid import (
@@ -66,14 +67,15 @@ class TerrainRasters:
         self.flat = dem is None
         crs = raster_crs(self.base, scene_crs, options.crs)
         self.georeference = RasterGeoreference(self.base, crs)
-        self.scene_from_base = PlaneTransformer(crs, scene_crs)
+        place = place_of(self.base, crs)
+        self.scene_from_base = PlaneTransformer(crs, scene_crs, place)
         self.photo: Orthophoto | None = None
         if ortho is not None:
             photo_type = MosaicPhoto if isinstance(ortho, RasterMosaic) else Orthophoto
             self.photo = photo_type(ortho, options.ground, options.texture_px, stretch)
             photo_crs = raster_crs(ortho, scene_crs, options.crs)
             self.photo_georeference = RasterGeoreference(ortho, photo_crs)
-            self.photo_from_base = PlaneTransformer(crs, photo_crs)
+            self.photo_from_base = PlaneTransformer(crs, photo_crs, place)
         self.height_field = self._open_heights(dem)
 
     def __enter__(self) -> Self:
@@ -122,6 +124,17 @@ class TerrainRasters:
         if self._scene_crs is not None and self._options.crs is None:
             missing = [raster for raster in (self.dem, self.ortho) if raster is not None and raster.crs is None]
             found += [finding("raster-crs-assumed", 1, Path(raster.name).name) for raster in missing]
+        return found
+
+    def exactness(self) -> list[dict[str, Any]]:
+        """Returns how exactly the rasters are transformed, as findings of a report."""
+        to_scene = [(self.base, self.scene_from_base, self._scene_crs)]
+        to_photo = [] if self.photo is None or self.ortho is None else [(self.base, self.photo_from_base, self.photo_georeference.crs)]
+        found = []
+        for raster, plane, target in [*to_scene, *to_photo]:
+            if plane.transformation is not None and target is not None and self.georeference.crs is not None:
+                names = {"from": str(self.georeference.crs.name), "to": str(horizontal_crs(target).name)}
+                found += transformation_findings(plane.transformation, names, Path(raster.name).name)
         return found
 
     def _checked(self, grid: VertexGrid, parts: int) -> VertexGrid:

@@ -31,7 +31,7 @@ use crate::document::source_format::SourceFormat;
 
 pub const CITYGML: SourceFormat = SourceFormat {
     name: NAME,
-    version: 11,
+    version: 12,
     is_library_object: false,
     detect: |head| head.xml_root() == Some("CityModel"),
     open: |path, options, formats| Ok(Box::new(CityGmlReader::open(path, options, formats)?)),
