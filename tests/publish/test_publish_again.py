@@ -8,7 +8,7 @@ from hashlib import sha256
 
 import pytest
 
-from map3d.errors import AlreadyExists, StoreError
+from map3d.errors import AlreadyExists, BadRequest, StoreError, VerifyFailed
 from map3d.object_store import ObjectStore, open_object_store
 from map3d.publish import publish, publish_rendering
 from map3d.publish.checksums import parse_checksums
@@ -301,3 +301,36 @@ def test_archives_are_named_by_their_content(workspace, out):
     after = {path.name: sha256(path.read_bytes()).hexdigest() for path in out.rglob("*.pmtiles")}
     assert len(names.keys() & after.keys()) == 4
     assert all(names[name] == after[name] for name in names.keys() & after.keys())
+
+
+PART_BYTES = 700
+
+
+@pytest.mark.parametrize("kind", ["folder", "store"])
+def test_archives_in_parts_hold_the_same_tiles_and_are_kept(workspace, tmp_path, monkeypatch, kind):
+    monkeypatch.setattr(publish_rendering, "_check_size", lambda *_: None)
+    out = tmp_path / "public"
+    target = out if kind == "folder" else out.as_uri()
+    done = publish(workspace, "tea", target, max_file_bytes=PART_BYTES)
+    assert (done.archives, done.kept) == (8, 0)
+    parts = sorted(out.rglob("*.pmtiles"))
+    assert len(parts) > 16
+    assert max(path.stat().st_size for path in parts) == PART_BYTES
+    assert json.loads((out / "rendering.json").read_text())["archive_part_bytes"] == PART_BYTES
+    verify_published(out, workspace)
+    before = contents(out)
+    done = publish(workspace, "tea", target, replace=True, max_file_bytes=PART_BYTES)
+    assert (done.written, done.kept, done.removed, contents(out)) == (0, 8, 0, before)
+    assert publish(workspace, "tea", target, replace=True, max_file_bytes=PART_BYTES, dry_run=True).kept == 8
+    parts[-1].write_bytes(b"cut")
+    with pytest.raises(VerifyFailed, match="bytes, expected"):
+        verify_published(out, workspace)
+    publish(workspace, "tea", target, replace=True)
+    verify_published(out, workspace)
+    publish(workspace, "tea", target, replace=True)
+    assert not [path for path in out.rglob("*.pmtiles") if path.name.count(".") > 1]
+
+
+def test_a_file_that_cannot_be_divided_is_named(workspace, out):
+    with pytest.raises(BadRequest, match=r"has .* bytes, more than --max-file allows \(1,000\)"):
+        publish(workspace, "tea", out, max_file_bytes=1000)

@@ -24,7 +24,7 @@ def command(workspace: Workspace, rendering: str, request: Publish, as_json: boo
 
     FOLDER can be copied to any web server that supports range requests. URL is a place in an object store; credentials come from the environment
     (AWS_*, GOOGLE_*, AZURE_*)."""
-    names = ("replace", "allow_incomplete", "url", "gis", "dry_run")
+    names = ("replace", "allow_incomplete", "url", "gis", "max_file_bytes", "dry_run")
     done = publish_with_progress(workspace, rendering, request.out, **{name: getattr(request, name) for name in names})
     if as_json:
         print_json(done)

@@ -75,6 +75,7 @@ def do_publish(workspace: Workspace, catalogue: Catalogue, operation: OperationR
         allow_incomplete=request.allow_incomplete,
         url=request.url,
         gis=request.gis,
+        max_file_bytes=request.max_file_bytes,
         progress=progress,
     )
     counts = {name: getattr(done, name) for name in ("files", "bytes", "written", "removed")}

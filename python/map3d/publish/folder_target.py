@@ -9,7 +9,7 @@ from typing import Any
 
 from map3d.errors import AlreadyExists, Corrupt
 from map3d.publish.checksums import CHECKSUMS, UNKNOWN, dump_checksums, file_digest, parse_checksums
-from map3d.publish.pmtiles_archive import Archive
+from map3d.publish.pmtiles_archive import Archive, existing_parts, split_archive
 from map3d.publish.target import KeptArchive, Target
 from map3d.tiles.manifest import FILE_NAME
 
@@ -32,15 +32,20 @@ class FolderTarget(Target):
         self.old_sizes = {path.relative_to(self.folder).as_posix(): path.stat().st_size for path in self.folder.rglob("*") if path.is_file()}
 
     def find_archive(self, name: str, metadata: dict[str, Any]) -> KeptArchive | None:
-        path = self.draft / name
-        tiles = count_finished_tiles(path, metadata)
-        digest = file_digest(path) if tiles else self.old_digests.get(name, UNKNOWN)
-        if not tiles:
-            tiles = count_finished_tiles(self.folder / name, metadata) if digest != UNKNOWN else 0
+        tiles = count_finished_tiles(self.draft / name, metadata, self.part_bytes)
+        if tiles:
+            digests = {path: file_digest(path) for path in existing_parts(self.draft / name, self.part_bytes)}
+        else:
+            published = {path: path.relative_to(self.folder).as_posix() for path in existing_parts(self.folder / name, self.part_bytes)}
+            if all(self.old_digests.get(file, UNKNOWN) != UNKNOWN for file in published.values()):
+                tiles = count_finished_tiles(self.folder / name, metadata, self.part_bytes)
             if not tiles:
                 return None
-            _link(self.folder / name, path)
-        self.record(name, digest, path.stat().st_size, changed=False)
+            for path, file in published.items():
+                _link(path, self.draft / file)
+            digests = {self.draft / file: self.old_digests[file] for file in published.values()}
+        for path, digest in digests.items():
+            self.record(path.relative_to(self.draft).as_posix(), digest, path.stat().st_size, changed=False)
         self.kept_archives += 1
         return KeptArchive(tiles)
 
@@ -49,7 +54,8 @@ class FolderTarget(Target):
 
     def add_archive(self, name: str) -> None:
         path = self.draft / name
-        self.record(name, file_digest(path), path.stat().st_size, changed=True)
+        for part in split_archive(path, self.part_bytes) if self.part_bytes else [path]:
+            self.record(part.relative_to(self.draft).as_posix(), file_digest(part), part.stat().st_size, changed=True)
 
     def add(self, name: str, data: bytes) -> None:
         path = self.draft / name
@@ -87,12 +93,12 @@ def old_of(folder: Path) -> Path:
     return folder.with_name(f".{folder.name}.old")
 
 
-def count_finished_tiles(path: Path, metadata: dict[str, Any]) -> int:
+def count_finished_tiles(path: Path, metadata: dict[str, Any], part_bytes: int = 0) -> int:
     """Returns the number of tiles in a complete archive with this metadata; 0 without one."""
-    if not path.is_file():
+    if not all(map(Path.is_file, existing_parts(path, part_bytes) or [path])):
         return 0
     try:
-        archive = Archive(path)
+        archive = Archive(path, part_bytes)
         return archive.count_tiles() if archive.metadata == metadata else 0
     except Corrupt:
         return 0

@@ -21,6 +21,7 @@ _writing: Any = pmtiles.writer
 
 TILE_TYPES: Final = {"webp": TileType.WEBP, "png": TileType.PNG, "jpeg": TileType.JPEG, "m3d": TileType.UNKNOWN}
 TILES_PER_STEP: Final = 256
+COPY_BYTES: Final = 1 << 20
 LEAF_ENTRIES: Final = 256
 """Tiles per leaf directory, about 0.9 kB. A client that shows one area of a large pyramid reads four or five. Doubled until the root fits."""
 
@@ -53,12 +54,12 @@ def write_archive(store: TileStore, layer: int, path: Path, metadata: dict[str, 
 class Archive:
     """A PMTiles archive, open for reading."""
 
-    def __init__(self, path: Path) -> None:
-        """Raises Corrupt unless the file is a PMTiles archive."""
+    def __init__(self, path: Path, part_bytes: int = 0) -> None:
+        """`part_bytes`: size of the files in which it is divided; 0 for one file. Raises Corrupt unless it is a PMTiles archive."""
         self.path = path
         try:
-            with path.open("rb") as file:
-                self._source = _reading.MmapSource(file)
+            self._files = existing_parts(path, part_bytes)
+            self._source = _PartsSource(self._files, part_bytes) if part_bytes else _open_source(path)
             self._reader = _reading.Reader(self._source)
             self._header = self._reader.header()
             self.metadata: dict[str, Any] = self._reader.metadata()
@@ -80,8 +81,9 @@ class Archive:
 
     def _check_length(self) -> None:
         end = self._header["tile_data_offset"] + self._header["tile_data_length"]
-        if end != self.path.stat().st_size:
-            raise Corrupt(f"{self.path}: the file has {self.path.stat().st_size} bytes, expected {end}; copy it again")
+        size = sum(file.stat().st_size for file in self._files)
+        if end != size:
+            raise Corrupt(f"{self.path}: the archive has {size} bytes, expected {end}; copy it again")
 
     def tiles(self) -> Iterator[tuple[TileId, bytes]]:
         """Yields the tiles by id. Raises Corrupt if a directory or the length of the file is wrong."""
@@ -91,6 +93,55 @@ class Archive:
                 yield TileId(z, x, y), data
         except (OSError, EOFError, ValueError, IndexError) as error:
             raise Corrupt(f"{self.path}: damaged directory; publish or copy the archive again: {error}") from error
+
+
+def part_path(path: Path, number: int) -> Path:
+    """Returns the path of a part of an archive (spec/manifest.md)."""
+    return path.with_suffix(f".{number}{path.suffix}")
+
+
+def existing_parts(path: Path, part_bytes: int) -> list[Path]:
+    """Returns the files of an archive that exist, in order."""
+    return list(itertools.takewhile(Path.is_file, (part_path(path, number) for number in itertools.count()))) if part_bytes else [path]
+
+
+def split_archive(path: Path, part_bytes: int) -> list[Path]:
+    """Divides an archive into files of `part_bytes`, which replace it; returns their paths."""
+    parts = []
+    with path.open("rb") as whole:
+        for number in range(-(-path.stat().st_size // part_bytes)):
+            parts.append(part_path(path, number))
+            parts[-1].unlink(missing_ok=True)
+            with parts[-1].open("xb") as part:
+                for length in [COPY_BYTES] * (part_bytes // COPY_BYTES) + [part_bytes % COPY_BYTES]:
+                    part.write(whole.read(length))
+                part.flush()
+                os.fsync(part.fileno())
+    path.unlink()
+    return parts
+
+
+class _PartsSource:
+    """Reads a divided archive as the library wants it."""
+
+    def __init__(self, files: list[Path], part_bytes: int) -> None:
+        self._sources, self._part_bytes = [_open_source(file) for file in files], part_bytes
+
+    def __call__(self, offset: int, length: int) -> bytes:
+        pieces = []
+        while length > 0:
+            number, start = divmod(offset, self._part_bytes)
+            size = min(length, self._part_bytes - start)
+            if number >= len(self._sources):
+                break
+            pieces.append(self._sources[number](start, size))
+            offset, length = offset + size, length - size
+        return b"".join(pieces)
+
+
+def _open_source(path: Path) -> Any:
+    with path.open("rb") as file:
+        return _reading.MmapSource(file)
 
 
 def _create_writer(file: BinaryIO, data: IO[bytes]) -> Any:

@@ -113,16 +113,17 @@ def publish(
     dry_run: bool = False,
     url: str | None = None,
     gis: bool = False,
+    max_file_bytes: int | None = None,
     progress: OnTiles | None = None,
 ) -> Published:
     """Publishes to a folder, or to an object store when `out` is a URL such as s3://BUCKET/PREFIX.
 
     `replace`: updates an earlier publication; `dry_run`: writes nothing; `url`: address at which people will open the map, for the picture of links;
     `gis`: also writes colour tiles as files, with layer definitions for QGIS and GDAL, which read no archives. The definitions name the tiles by
-    `url`, else by the path of the folder.
+    `url`, else by the path of the folder. `max_file_bytes`: divides archives into files of this size, for hosts with a limit.
 
-    Raises NotFound, AlreadyExists, BadRequest (incomplete, or `gis` to an object store without `url`), Corrupt (tiles changed meanwhile), Stopped,
-    StoreError; ViewerMissing before any work.
+    Raises NotFound, AlreadyExists, BadRequest (incomplete, a file that is not divided is larger than `max_file_bytes`, or `gis` to an object store
+    without `url`), Corrupt (tiles changed meanwhile), Stopped, StoreError; ViewerMissing before any work.
     """
     viewer_folder()
     record = rendering_record(workspace, rendering)
@@ -133,6 +134,7 @@ def publish(
     publisher = _Publisher(workspace, record, manifest, target, progress or (lambda *_: True))
     try:
         target.start(replace)
+        target.part_bytes = max_file_bytes or 0
         publisher.write(url, tiles_at)
         target.finish()
     except OSError as error:
@@ -189,10 +191,11 @@ class _Publisher:
     def write(self, url: str | None, tiles_at: str | None) -> None:
         """Files that refer to others come last. `tiles_at`: address of the folder, if it shall have files for GIS software."""
         archives = {view.frame.id: self._write_view(view) for view in self._manifest.views}
-        manifest = self._manifest.with_archives(archives, self._content_version())
+        manifest = self._manifest.with_archives(archives, self._content_version(), self._target.part_bytes)
         last: dict[str, bytes] = {FILE_NAME: manifest.dump()}
         files = chain(self._files(url), () if tiles_at is None else self._gis_files(tiles_at))
         for count, (name, data) in enumerate(files, 1):
+            _check_size(name, len(data), self._target.part_bytes)
             if name in LAST:
                 last[name] = data
             else:
@@ -255,7 +258,8 @@ class _Publisher:
     def _write_archive(self, store: TileStore, layer: Layer, view: ManifestView) -> str | None:
         """Returns the archive's path; None for a layer without tiles."""
         metadata = self._metadata(store, layer, view.frame.id)
-        name = f"{view.frame.id}/{layer.name}-{_digest(metadata)[:16]}.pmtiles"
+        part_bytes = self._target.part_bytes
+        name = f"{view.frame.id}/{layer.name}-{_digest([metadata, part_bytes] if part_bytes else metadata)[:16]}.pmtiles"
         found = self._target.find_archive(name, metadata)
         if found is not None:
             tiles = view.occupancy.count() if found.tiles is None else found.tiles
@@ -303,6 +307,12 @@ class _Publisher:
         self._done += tiles
         if not self._progress("tiles", self._done, max(self._total, self._done)):
             raise Stopped(f"publishing stopped after {self._done:,} tiles; publish again to resume")
+
+
+def _check_size(name: str, size: int, limit: int) -> None:
+    """Raises BadRequest for a file that is not divided and exceeds the limit; 0: none."""
+    if 0 < limit < size:
+        raise BadRequest(f"{name} has {size:,} bytes, more than --max-file allows ({limit:,}), and is not divided; allow larger files")
 
 
 def _digest(value: Any) -> str:

@@ -16,6 +16,7 @@ from typing import Any, Final
 from map3d.errors import AlreadyExists
 from map3d.object_store import ObjectStore
 from map3d.publish.checksums import CHECKSUMS, UNKNOWN, dump_checksums, file_digest, parse_checksums
+from map3d.publish.pmtiles_archive import split_archive
 from map3d.publish.target import LAST, KeptArchive, Target, is_named_by_content, is_written_by_publish
 from map3d.tiles.manifest import FILE_NAME
 
@@ -67,10 +68,11 @@ class StoreTarget(Target):
         self._journal = {name: digest for name, digest in self.old_digests.items() if name in self.old_sizes}
 
     def find_archive(self, name: str, metadata: dict[str, Any]) -> KeptArchive | None:
-        digest = self._journal.get(name, UNKNOWN)
-        if digest == UNKNOWN:
+        names = self.find_parts(name, self._journal)
+        if not names or any(self._journal[part] == UNKNOWN for part in names):
             return None
-        self.record(name, digest, self.old_sizes[name], changed=False)
+        for part in names:
+            self.record(part, self._journal[part], self.old_sizes[part], changed=False)
         self.kept_archives += 1
         return KeptArchive(None)
 
@@ -81,10 +83,14 @@ class StoreTarget(Target):
         path = self._staging / name
         if not self._journal:
             self._write_journal()
-        self._store.put(name, path, headers=object_headers(name))
-        self.record(name, file_digest(path), path.stat().st_size, changed=True)
-        path.unlink()
-        self._journal[name] = self.digests[name]
+        sent = {}
+        for part in split_archive(path, self.part_bytes) if self.part_bytes else [path]:
+            file = part.relative_to(self._staging).as_posix()
+            self._store.put(file, part, headers=object_headers(file))
+            self.record(file, file_digest(part), part.stat().st_size, changed=True)
+            part.unlink()
+            sent[file] = self.digests[file]
+        self._journal |= sent
         self._write_journal()
 
     def add(self, name: str, data: bytes) -> None:

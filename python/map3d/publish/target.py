@@ -5,10 +5,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection
 from dataclasses import dataclass
 from hashlib import sha256
+from itertools import count, takewhile
 from pathlib import Path
 from typing import Any, Final
 
 from map3d.publish.checksums import CHECKSUMS, UNKNOWN
+from map3d.publish.pmtiles_archive import part_path
 from map3d.tiles.manifest import FILE_NAME
 from map3d.tiles.viewer_files import PAGE
 
@@ -16,7 +18,7 @@ SEARCH_ROOT: Final = "objects/search.json"
 LAST: Final = (SEARCH_ROOT, PAGE, FILE_NAME)
 """Files that refer to others, and are written after them."""
 
-_NAMED_BY_CONTENT: Final = re.compile(r"objects/search/[0-9a-f]{16}\.json|[^/]+/[a-z0-9_-]+-[0-9a-f]{16}\.pmtiles")
+_NAMED_BY_CONTENT: Final = re.compile(r"objects/search/[0-9a-f]{16}\.json|[^/]+/[a-z0-9_-]+-[0-9a-f]{16}(\.[0-9]+)?\.pmtiles")
 _DOCUMENT: Final = re.compile(r"objects/[0-9a-z/]+\.json|gis/[0-9.]+-[0-9.]+(/[0-9a-z_-]+/[0-9/]+\.(webp|png|jpg)|(-[0-9a-z_-]+)?\.(wkt|xml|qlr))")
 
 
@@ -52,6 +54,8 @@ class Target(ABC):
         self.kept_for_open_maps: list[str] = []
         """Files of the publication that this one replaces, which open maps may still read: they stay until the next one."""
         self.kept_archives = 0
+        self.part_bytes = 0
+        """Size of the files in which archives are divided; 0 for whole archives."""
         self.old_digests: dict[str, str] = {}
         self.old_sizes: dict[str, int] = {}
 
@@ -88,6 +92,12 @@ class Target(ABC):
     def close(self) -> None:  # noqa: B027
         """Releases what the target holds, also after an error."""
 
+    def find_parts(self, name: str, known: Collection[str]) -> list[str]:
+        """Returns the known files of an archive, in order."""
+        if not self.part_bytes:
+            return [name] if name in known else []
+        return list(takewhile(lambda part: part in known, (part_path(Path(name), number).as_posix() for number in count())))
+
     def record(self, name: str, digest: str, size: int, *, changed: bool) -> None:
         self.digests[name], self.sizes[name] = digest, size
         if changed:
@@ -113,9 +123,11 @@ class DryRun(Target):
         self.old_digests, self.old_sizes = self._target.old_digests, self._target.old_sizes
 
     def find_archive(self, name: str, metadata: dict[str, Any]) -> KeptArchive | None:
-        if self.old_digests.get(name, UNKNOWN) == UNKNOWN or name not in self.old_sizes:
+        names = self.find_parts(name, self.old_sizes)
+        if not names or any(self.old_digests.get(part, UNKNOWN) == UNKNOWN for part in names):
             return None
-        self.record(name, self.old_digests[name], self.old_sizes[name], changed=False)
+        for part in names:
+            self.record(part, self.old_digests[part], self.old_sizes[part], changed=False)
         self.kept_archives += 1
         return KeptArchive(None)
 

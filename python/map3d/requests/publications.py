@@ -51,6 +51,16 @@ class Publish:
         help="Also write colour tiles as files, with layer definitions for QGIS and GDAL in the folder gis.",
         label="Also files for QGIS and GDAL",
     )
+    max_file_bytes: int | None = param(
+        None,
+        help="Divide archives into files of at most this size, for hosts that limit it: 25M on Cloudflare Pages, 100M on GitHub Pages.",
+        example="25M",
+        words="whole archives",
+        option="--max-file",
+        minimum=1 << 20,
+        is_size=True,
+        label="Largest size of a file",
+    )
     dry_run: bool = param(
         False,
         help="Print what would be written or sent, and its size, without doing so.",

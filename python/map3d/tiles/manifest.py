@@ -82,7 +82,8 @@ class ManifestView:
 
 @dataclass(frozen=True)
 class Manifest:
-    """Everything that a client needs. `box`: of the content, local; `start`: local, None for the centre of the box."""
+    """Everything that a client needs. `box`: of the content, local; `start`: local, None for the centre of the box; `archive_part_bytes`: size of the
+    files in which archives are divided, 0 for whole archives."""
 
     name: str
     content_version: int
@@ -98,6 +99,7 @@ class Manifest:
     samples: int = 16
     objects: int = 0
     geographic: Geographic | None = None
+    archive_part_bytes: int = 0
 
     def __post_init__(self) -> None:
         check_name(self.name, "rendering")
@@ -124,11 +126,11 @@ class Manifest:
     def view(self, view_id: str) -> ManifestView | None:
         return next((view for view in self.views if view.frame.id == view_id), None)
 
-    def with_archives(self, archives: Mapping[str, Mapping[str, str]], content_version: int) -> Self:
+    def with_archives(self, archives: Mapping[str, Mapping[str, str]], content_version: int, part_bytes: int = 0) -> Self:
         """Returns the manifest of a published folder. `archives`: view id → layer → path; `content_version`: also of every block."""
         versions = (BlockVersions(content_version),) * len(self.passes)
         views = tuple(replace(view, archives=archives[view.frame.id], versions=versions) for view in self.views)
-        return replace(self, content_version=content_version, views=views)
+        return replace(self, content_version=content_version, views=views, archive_part_bytes=part_bytes)
 
     def to_json(self) -> dict[str, Any]:
         frame = self.views[0].frame
@@ -151,6 +153,7 @@ class Manifest:
             "size_m": frame.size_m,
             "samples": self.samples,
             "layers": [_layer_json(layer) for layer in self.layers],
+            **({"archive_part_bytes": self.archive_part_bytes} if self.archive_part_bytes else {}),
             "views": [_view_json(view, self.passes) for view in self.views],
             "objects": {
                 "count": self.objects,
@@ -191,6 +194,7 @@ class Manifest:
                 samples=int(value["samples"]),
                 objects=int(value["objects"]["count"]),
                 geographic=Geographic.load(value["geographic"]) if "geographic" in value else None,
+                archive_part_bytes=int(value.get("archive_part_bytes", 0)),
             )
         except (KeyError, TypeError, ValueError, IndexError, AttributeError, Map3dError) as error:
             raise Corrupt(f"{where}: invalid manifest: {type(error).__name__}: {error}") from error

@@ -51,7 +51,7 @@ def verify_published(folder: Path, workspace: Workspace | None = None) -> Verifi
                 if workspace is not None and record is not None:
                     store = opened.enter_context(open_track(workspace, record, track_id(view.frame.id, number)))
                 for layer in layers:
-                    found, added_problems = _check_layer(folder, view, layer, store)
+                    found, added_problems = _check_layer(folder, view, layer, store, manifest.archive_part_bytes)
                     archives, tiles, problems = archives + (found > 0), tiles + found, problems + added_problems
     if problems:
         more = f", and {len(problems) - SHOWN} more" if len(problems) > SHOWN else ""
@@ -72,14 +72,14 @@ def _check_sums(folder: Path) -> tuple[int, list[str]]:
     return len(digests) - len(problems), problems
 
 
-def _check_layer(folder: Path, view: ManifestView, layer: Layer, store: TileStore | None) -> tuple[int, list[str]]:
-    """Returns the number of tiles and the problems. `store`: the tile store to compare with."""
+def _check_layer(folder: Path, view: ManifestView, layer: Layer, store: TileStore | None, part_bytes: int) -> tuple[int, list[str]]:
+    """Returns the number of tiles and the problems. `store`: the tile store to compare with; `part_bytes`: size of the parts of archives, or 0."""
     name = (view.archives or {}).get(layer.name)
     if name is None:
         count = view.occupancy.count()
         return 0, [f"view {view.frame.id}: no archive for {count} tiles of layer {layer.name}"] if count else []
     try:
-        archive = Archive(folder / name)
+        archive = Archive(folder / name, part_bytes)
         problems = [] if archive.has_format_of(layer) else [f"{name}: its tiles are not {layer.format}"]
         seen: set[TileId] = set()
         problems += _check_tiles(archive, name, layer, store, seen)

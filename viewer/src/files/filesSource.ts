@@ -1,4 +1,15 @@
-import { Archive, FetchError, Map3dError, readManifest, type LayerInfo, type Rendering, type Source, type Tile, type View } from "../map3d";
+import {
+  Archive,
+  FetchError,
+  Map3dError,
+  readManifest,
+  type LayerInfo,
+  type ReadRange,
+  type Rendering,
+  type Source,
+  type Tile,
+  type View,
+} from "../map3d";
 import { findManifestFolders, isInside, MANIFEST, relativePath, subfolder, type Folder } from "./folder";
 import { getFilesMessages, type FilesProblem } from "./i18n";
 
@@ -72,7 +83,7 @@ class FilesSource implements Source {
 
   async tile(view: View, layer: LayerInfo, { z, x, y }: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null> {
     const archive = view.archives?.[layer.name];
-    if (archive !== undefined) return this.#archive(archive).tile({ z, x, y }, signal);
+    if (archive !== undefined) return this.#archive(archive, view.part_bytes).tile({ z, x, y }, signal);
     const path = [view.id, layer.name, z, x, y].join("/");
     const file = await this.#requireFile(path);
     signal?.throwIfAborted();
@@ -84,7 +95,8 @@ class FilesSource implements Source {
     if (json === null) throw new FilesError("none");
     const rendering = readManifest(json, MANIFEST);
     const missing: string[] = [];
-    for (const path of [...rendering.views.values()].flatMap(({ archives }) => Object.values(archives ?? {}))) {
+    const archives = [...rendering.views.values()].flatMap((view) => Object.values(view.archives ?? {}));
+    for (const path of rendering.json.archive_part_bytes ? archives.map((archive) => Archive.partName(archive, 0)) : archives) {
       const file = await this.#file(path);
       if (file) this.#files.set(path, file);
       else missing.push(path);
@@ -93,10 +105,16 @@ class FilesSource implements Source {
     return rendering;
   }
 
-  #archive(path: string): Archive {
+  #archive(path: string, part_bytes?: number): Archive {
     const known = this.#archives.get(path);
     if (known) return known;
-    const archive = new Archive(path, async (offset, length, signal) => {
+    const archive = new Archive(path, (file) => this.#reader(file), part_bytes);
+    this.#archives.set(path, archive);
+    return archive;
+  }
+
+  #reader(path: string): ReadRange {
+    return async (offset, length, signal) => {
       const whole = this.#files.get(path) ?? (await this.#requireFile(path));
       signal?.throwIfAborted();
       // Only the first part may reach beyond the end of a small archive.
@@ -105,9 +123,7 @@ class FilesSource implements Source {
           `${path}: expected ${String(length)} bytes at ${String(offset)}, but the file has ${String(whole.size)} bytes; copy the file again`,
         );
       return read(whole.slice(offset, offset + length), path);
-    });
-    this.#archives.set(path, archive);
-    return archive;
+    };
   }
 
   async #requireFile(path: string): Promise<Blob> {

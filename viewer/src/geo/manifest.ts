@@ -64,6 +64,7 @@ export interface ManifestJson {
   attribution: string;
   /** Increases with every change of the content. */
   content_version: number;
+  archive_part_bytes?: number;
   /** Whether all tiles have been rendered. */
   complete: boolean;
   crs: {
@@ -98,6 +99,8 @@ export interface View {
   readonly frame: Frame;
   readonly occupancy: Pick<Occupancy, "has">;
   readonly archives: Readonly<Record<string, string>> | undefined;
+  /** Size of the files in which archives are divided; undefined for whole archives. */
+  readonly part_bytes: number | undefined;
   /** Returns the version of the block that holds a layer's tile. */
   versionOf(tile: Tile, layer: LayerInfo): number;
 }
@@ -136,6 +139,7 @@ function makeView(view: ViewJson, json: ManifestJson): View {
     frame: makeFrame(view, json.size_m, json.tile_px, json.zmax),
     occupancy: new Occupancy(view.occupancy, json.zmax),
     archives: view.archives,
+    part_bytes: json.archive_part_bytes,
     versionOf: (tile, layer) => {
       const { version, versions } = passes.get(layer.name) ?? view;
       return versions?.[tileName(blockRoot(tile, json.zmax))] ?? version;

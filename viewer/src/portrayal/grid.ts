@@ -72,6 +72,7 @@ export function makeViews(
       frame,
       occupancy: { has: (tile) => meetsBox(frame, tile, center, half) },
       archives: undefined,
+      part_bytes: undefined,
       versionOf: () => 1,
     };
   });

@@ -47,9 +47,31 @@ export class Archive {
   readonly #directories = new Map<number, Promise<DirectoryEntry[]>>();
   #header: Promise<ArchiveHeader> | undefined;
 
-  constructor(name: string, read: ReadRange) {
+  /** @param open returns the reader of a file  @param part_bytes size of the files in which it is divided; undefined: it is one file */
+  constructor(name: string, open: (path: string) => ReadRange, part_bytes?: number) {
     this.#name = name;
-    this.#read = read;
+    this.#read = part_bytes ? (...range) => this.#readParts(open, part_bytes, ...range) : open(name);
+  }
+
+  /** Returns the name of a part of a divided archive. */
+  static partName(path: string, part: number): string {
+    return path.replace(/\.pmtiles$/, `.${String(part)}$&`);
+  }
+
+  #readParts(
+    open: (path: string) => ReadRange,
+    part_bytes: number,
+    offset: number,
+    length: number,
+    signal?: AbortSignal,
+  ): Promise<ArrayBuffer> {
+    const pieces: Promise<ArrayBuffer>[] = [];
+    for (let at = offset, size; at < offset + length; at += size) {
+      const part = Math.floor(at / part_bytes);
+      size = Math.min(offset + length, (part + 1) * part_bytes) - at;
+      pieces.push(open(Archive.partName(this.#name, part))(at - part * part_bytes, size, signal));
+    }
+    return Promise.all(pieces).then((all) => new Blob(all).arrayBuffer());
   }
 
   /** Returns a tile's bytes; null when it is not in the archive. */

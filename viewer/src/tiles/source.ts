@@ -2,7 +2,7 @@ import { FetchError, UsageError } from "../core/errors";
 import type { Tile } from "../geo/frame";
 import { readManifest, type LayerInfo, type Rendering, type View } from "../geo/manifest";
 import { fetchBytes, fetchJson, type FetchFunction, type FetchOptions } from "./fetch";
-import { Archive } from "./pmtiles";
+import { Archive, type ReadRange } from "./pmtiles";
 import type { TileData } from "./tileData";
 import { normalizeBaseUrl, tileUrls } from "./url";
 
@@ -54,7 +54,7 @@ export class HttpSource implements Source {
 
   tile(view: View, layer: LayerInfo, tile: Tile, signal?: AbortSignal): Promise<ArrayBuffer | null> {
     const archive = view.archives?.[layer.name];
-    if (archive !== undefined) return this.#openArchive(archive).tile(tile, signal);
+    if (archive !== undefined) return this.#openArchive(archive, view.part_bytes).tile(tile, signal);
     return fetchBytes(tileUrls(this.bases, view.id, layer.name, tile, view.versionOf(tile, layer)), this.#withFetch({ signal }));
   }
 
@@ -66,15 +66,18 @@ export class HttpSource implements Source {
     return { ...options, fetch: this.#fetch };
   }
 
-  #openArchive(path: string): Archive {
+  #openArchive(path: string, part_bytes?: number): Archive {
     const known = this.#archives.get(path);
     if (known) return known;
-    const urls = this.#urls(path);
-    const archive = new Archive(path, async (offset, length, signal) => {
-      const bytes = await fetchBytes(urls, this.#withFetch({ range: [offset, length], signal }));
-      if (!bytes) throw new FetchError(`${urls[0] ?? path}: no content`, 204);
-      return bytes;
-    });
+    const open =
+      (file: string): ReadRange =>
+      async (offset, length, signal) => {
+        const urls = this.#urls(file);
+        const bytes = await fetchBytes(urls, this.#withFetch({ range: [offset, length], signal }));
+        if (!bytes) throw new FetchError(`${urls[0] ?? file}: no content`, 204);
+        return bytes;
+      };
+    const archive = new Archive(path, open, part_bytes);
     this.#archives.set(path, archive);
     return archive;
   }

@@ -6,7 +6,7 @@ import { MAP_OPTIONS } from "../../src/map/options";
 import { Cache, computeCacheBytes } from "../../src/tiles/cache";
 import { findCover, sortFromCenter, computeLevel, findFallbacks, type Rect } from "../../src/tiles/cover";
 import { fetchBytes, type FetchFunction } from "../../src/tiles/fetch";
-import { Archive, tileId } from "../../src/tiles/pmtiles";
+import { Archive, tileId, type ReadRange } from "../../src/tiles/pmtiles";
 import { RequestQueue, type TileRequest } from "../../src/tiles/queue";
 import { normalizeBaseUrl, chooseHost, tileUrl, tileUrls } from "../../src/tiles/url";
 
@@ -369,7 +369,7 @@ describe("PMTiles", () => {
   test("every tile matches the reference reader", async () => {
     const bytes = archive();
     const part = (offset: number, length: number): Promise<ArrayBuffer> => Promise.resolve(bytes.slice(offset, offset + length).buffer);
-    const mine = new Archive("x.pmtiles", part);
+    const mine = new Archive("x.pmtiles", () => part);
     const source: PmSource = { getKey: () => "x", getBytes: async (offset, length) => ({ data: await part(offset, length) }) };
     const theirs = new PMTiles(source);
     for (let y = 0; y < 4; y++) {
@@ -385,8 +385,25 @@ describe("PMTiles", () => {
     expect(await mine.tile({ z: 3, x: 0, y: 0 })).toBeNull();
   });
 
+  test("a divided archive is read from its parts, by ranges that span several as well", async () => {
+    const bytes = archive();
+    const whole = new Archive("0-45/x.pmtiles", () => (offset, length) => Promise.resolve(bytes.slice(offset, offset + length).buffer));
+    for (const size of [40, 127, bytes.length]) {
+      const read = (name: string): ReadRange => {
+        const part = Number(/^0-45\/x\.(\d+)\.pmtiles$/.exec(name)?.[1]);
+        const file = bytes.slice(part * size, (part + 1) * size);
+        return (offset, length) => Promise.resolve(file.slice(offset, offset + length).buffer);
+      };
+      const divided = new Archive("0-45/x.pmtiles", read, size);
+      for (let x = 0; x < 4; x++) {
+        const [got, want] = await Promise.all([divided, whole].map((each) => each.tile({ z: 2, x, y: 1 })));
+        expect(new Uint8Array(got ?? new ArrayBuffer(0))).toEqual(new Uint8Array(want ?? new ArrayBuffer(1)));
+      }
+    }
+  });
+
   test("a file that is not an archive is refused", async () => {
-    await expect(new Archive("x.pmtiles", () => Promise.resolve(new ArrayBuffer(200))).tile({ z: 0, x: 0, y: 0 })).rejects.toThrow(
+    await expect(new Archive("x.pmtiles", () => () => Promise.resolve(new ArrayBuffer(200))).tile({ z: 0, x: 0, y: 0 })).rejects.toThrow(
       /not a PMTiles/,
     );
   });
