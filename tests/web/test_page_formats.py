@@ -43,6 +43,7 @@ ROWS = [
     ("percent", (999, 1000), "99 %", f"99{NO_BREAK}%", f"99{NARROW}%"),
     ("metres", (0.2,), "0.2 m", f"0,2{NO_BREAK}m", f"0,2{NARROW}m"),
     ("distance", (3254,), "3.25 km", f"3,25{NO_BREAK}km", f"3,25{NARROW}km"),
+    ("distance", (999_999,), "1,000 km", f"1.000{NO_BREAK}km", f"1{NARROW}000{NARROW}km"),
     ("distance", (1_200_000,), "1,200 km", f"1.200{NO_BREAK}km", f"1{NARROW}200{NARROW}km"),
     ("date", (WHEN,), "23 November 2026", "23. Nov. 2026", "23 nov. 2026"),
     ("moment", (WHEN,), "23 November 2026, 14:05 UTC", "23. Nov. 2026, 14:05 UTC", "23 nov. 2026, 14:05 UTC"),

@@ -86,6 +86,7 @@ class _Operations:
     unavailable: Sequence[Any] = ()
 
 
+@lru_cache(maxsize=64)
 def _operations(source: CRS, target: CRS, *, allow_ballpark: bool = False) -> _Operations:
     """Suppresses the warning that a better operation is not installed: the import report contains it."""
     with warnings.catch_warnings():
@@ -117,12 +118,18 @@ def _described(steps: Sequence[Transformer], groups: Sequence[_Operations], plac
     total = sum(accuracies) if known else None
     # Transformers of a group are bound to the thread that made them.
     own = tuple(Transformer.from_pipeline(step.definition) for step in steps)
-    found = Transformation(own, " + ".join(step.description for step in steps), total)
+    found = Transformation(own, " + ".join(_words(step.description) for step in steps), total)
     unavailable = [one for group in groups for one in group.unavailable if place is None or _reaches(one, place)]
     better = next((one for one in unavailable if total is None or 0.0 <= one.accuracy < total), None)
     if better is None:
         return found
-    return replace(found, better=better.name, grids=tuple(grid.short_name for grid in better.grids if not grid.available))
+    return replace(found, better=_words(better.name), grids=tuple(grid.short_name for grid in better.grids if not grid.available))
+
+
+def _words(description: str) -> str:
+    """Leaves out the steps that only exchange axes."""
+    parts = [part for part in description.split(" + ") if not part.startswith("axis order change")]
+    return " + ".join(parts) or description
 
 
 def _missing_grids(groups: Sequence[_Operations]) -> list[str]:

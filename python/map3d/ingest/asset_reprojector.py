@@ -11,15 +11,14 @@ from pyproj.crs import CompoundCRS
 from map3d.catalogue import SceneCrs
 from map3d.errors import CrsError
 from map3d.formats import find_format
-from map3d.geometry.crs import has_ellipsoidal_heights, horizontal_crs, is_local, is_metric, parse_crs, vertical_crs, vertical_crs_name
+from map3d.geometry.crs import has_ellipsoidal_heights, horizontal_crs, is_local, parse_crs, vertical_crs, vertical_crs_name
 from map3d.ingest.axis_order import is_north_first
 from map3d.ingest.coordinate_check import CoordinateCheck
 from map3d.ingest.crs_transformer import CrsTransformer, Points
 from map3d.ingest.evidence import Evidence
-from map3d.ingest.exactness import better_words, transformation_findings
-from map3d.ingest.findings import finding
+from map3d.ingest.exactness import better_words, stretch_findings, transformation_findings
 from map3d.ingest.height_unit import ChosenUnit, choose_height_unit
-from map3d.ingest.scene_crs import LOCAL, choose_scene_crs, length_error, stretches, to_scene_crs
+from map3d.ingest.scene_crs import LOCAL, choose_scene_crs, to_scene_crs
 from map3d.messages import message
 from map3d.requests.reading import Axes
 
@@ -61,11 +60,7 @@ class AssetReprojector:
     def _choose_transformer(self, source: CRS, check: CoordinateCheck, points: Points) -> CrsTransformer:
         place = None if check.place is None else (check.place.lon, check.place.lat)
         self._target = target = self._target or _with_vertical_crs(choose_scene_crs(source, points, check.middle), source)
-        for crs, code in ((target, "scene-crs-stretches"), (source, "crs-stretches")):
-            if place is not None and is_metric(crs) and stretches(crs, *place):
-                factor = round(1.0 + length_error(crs, *place), 4)
-                self._stretched.append(finding(code, 1, name=str(horizontal_crs(crs).name), factor=factor, scene=str(horizontal_crs(target).name)))
-                break
+        self._stretched = stretch_findings(source, target, place)
         self._unit = choose_height_unit(source, self._asset_crs or "", self._evidence)
         return CrsTransformer(source, target, place, self._unit.metres)
 

@@ -18,9 +18,10 @@ RIGHT_ANGLE_COS: Final = 0.02
 MIN_RIGHT_ANGLES: Final = 8
 METRES_PER_DEGREE: Final = 111_320.0
 
-MIN_BODIES: Final = 3
+MIN_FACES: Final = 18
+"""Surfaces of three boxes: a single house tells nothing, since some are modelled inside out."""
 AGREEING: Final = 0.8
-"""Share by which the bodies that face one way must exceed the others."""
+"""Share by which the surfaces that face one way must exceed the others."""
 OPEN: Final = 0.01
 """Greatest sum of the area vectors of a closed body, as a part of its area."""
 LEAST_VOLUME: Final = 1e-3
@@ -70,10 +71,11 @@ def facing_axes(rings: Sequence[Ring], horizontal: CRS) -> Axes:
     """Decides by closed bodies, whose surfaces face outwards, and by roofs, which face up, and ground, which faces down: in a mirrored reading they
     face the other way."""
     scale = METRES_PER_DEGREE if horizontal.is_geographic else 1.0
-    votes = [vote for body in _bodies(rings) if (vote := _facing(body, scale))]
-    if len(votes) < MIN_BODIES or abs(sum(votes)) < AGREEING * len(votes):
+    votes = [(vote, len(body)) for body in _bodies(rings) if (vote := _facing(body, scale))]
+    faces, upright = sum(count for _, count in votes), sum(vote * count for vote, count in votes)
+    if faces < MIN_FACES or abs(upright) < AGREEING * faces:
         return "auto"
-    return "east-north" if sum(votes) > 0 else "north-east"
+    return "east-north" if upright > 0 else "north-east"
 
 
 def _bodies(rings: Iterable[Ring]) -> Iterable[list[Ring]]:

@@ -29,6 +29,8 @@ TIMES_NEARER: Final = 4.0
 
 MAX_EXTENT_DEG: Final = 5.0
 LOCAL_M: Final = 100_000.0
+NO_PLACE_M: Final = 1000.0
+"""Projected coordinates nearer to 0, 0 are those of a model without a place, whatever its label."""
 SAMPLE: Final = 50_000
 
 _LITERAL: Final = ("urn:ogc:def:crs", "ogc:", "http")
@@ -154,7 +156,9 @@ class CoordinateCheck:
         if by_town != "auto":
             return AxisDecision(by_town, "town", places)
         by_name = named_axes(self._label, self._horizontal)
-        return AxisDecision(self._expected if by_name == "auto" else by_name, "name", places)
+        if by_name == "auto" or (not self._is_geographic and np.abs(middle).max() < NO_PLACE_M):
+            return AxisDecision(self._expected, "name", places)
+        return AxisDecision(by_name, "name", places)
 
     def _own_axes(self, points: Points, places: Places) -> Axes:
         """Returns the order that the file itself, or the user, states; "auto" where both are possible."""
@@ -236,7 +240,7 @@ class CoordinateCheck:
         other: Axes = "east-north" if decision.axes == "north-east" else "north-east"
         words, elsewhere = _WORDS[self._is_geographic, decision.axes], decision.places[other]
         numbers = f"{middle[0]:.10g} {middle[1]:.10g} is {self.place}"
-        differs = elsewhere is not None and self._fits(*elsewhere)
+        differs = elsewhere is not None and self._fits(*elsewhere) and (self._is_geographic or np.abs(middle).max() >= NO_PLACE_M)
         there = f"; in the other order it would be {find_place(*elsewhere)}" if elsewhere is not None and differs else ""
         if decision.by in ("others", "name") and differs and _nearer_town(decision.places) != decision.axes:
             code = "axes-like-other-files" if decision.by == "others" else "axes-ambiguous"

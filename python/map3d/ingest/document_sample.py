@@ -32,7 +32,6 @@ _TOKEN: Final = re.compile(
 )
 _ATTRIBUTE: Final = re.compile(rb"\b(srsName|srsDimension|axisLabels|uomLabels|uom)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _TAG: Final = re.compile(rb"<[^<>]*>")
-_MEMBER_END: Final = re.compile(rb"</(?:[\w.-]+:)?(?:cityObjectMember|featureMember|member)\s*>")
 
 Points = NDArray[np.float64]
 """(n, 3), in the document's order of axes."""
@@ -121,12 +120,9 @@ class _Scan:
         self._dimension, self._surface = 3, ""
 
     def read(self, piece: bytes, *, is_head: bool) -> None:
-        start = 0
         if not is_head:
             self._end_member()
-            end = _MEMBER_END.search(piece)
-            start = len(piece) if end is None else end.end()
-        for token in _TOKEN.finditer(piece, start):
+        for token in _TOKEN.finditer(piece):
             found = token.groupdict()
             if found["ring"] is not None:
                 self._add_ring(found["ring_tag"], found["ring"])

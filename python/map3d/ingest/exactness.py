@@ -1,29 +1,40 @@
-"""Says how exact a transformation between two datums is, and which grid would make it better."""
+"""Says how exact positions in a scene are: the transformation between two datums, the grid that would make it better, and lengths that are none."""
 
 from collections.abc import Mapping
 from typing import Any, Final
 
-from map3d.geometry.transformations import Transformation
+from pyproj import CRS
+
+from map3d.geometry.crs import horizontal_crs, is_metric
+from map3d.geometry.transformations import LonLat, Transformation
 from map3d.ingest.findings import finding
+from map3d.ingest.scene_crs import length_error, stretches
 
 EXACT_M: Final = 1.0
 """Nothing is said about transformations that are at least so accurate, such as between ETRS89 and WGS 84."""
 
 
-def transformation_findings(transformation: Transformation, placing: Mapping[str, Any], file: str = "") -> list[dict[str, Any]]:
-    """Returns what is worth knowing, as findings of a report. `placing`: {"from", "to"}: names of the two CRSs; `file`: that was transformed, where
-    the report is of several."""
+def transformation_findings(transformation: Transformation, placing: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Returns what is worth knowing, as findings of a report. `placing`: {"from", "to"}: names of the two CRSs."""
     values = {"source": placing["from"], "target": placing["to"]}
-    about = f"{file}: " if file else ""
     if transformation.inexact:
-        return [finding("datum-without-name", 1, f"{about}{transformation.description}", **values)]
+        return [finding("datum-without-name", 1, transformation.description, **values)]
     accuracy = transformation.accuracy_m
     if accuracy is not None and accuracy <= EXACT_M:
         return []
-    example = f"{about}{transformation.description}{better_words(transformation)}"
+    example = f"{transformation.description}{better_words(transformation)}"
     if accuracy is None:
         return [finding("transformed-with-unknown-accuracy", 1, example, **values)]
     return [finding("transformed-inexactly", 1, example, **values, accuracy=accuracy)]
+
+
+def stretch_findings(source: CRS, scene: CRS, place: LonLat | None) -> list[dict[str, Any]]:
+    """Returns what is worth knowing about lengths, as findings of a report: in the CRS of the scene, else in the one that the file left for it."""
+    for crs, code in ((scene, "scene-crs-stretches"), (source, "crs-stretches")):
+        if place is not None and is_metric(crs) and stretches(crs, *place):
+            factor = round(1.0 + length_error(crs, *place), 4)
+            return [finding(code, 1, name=str(horizontal_crs(crs).name), factor=factor, scene=str(horizontal_crs(scene).name))]
+    return []
 
 
 def better_words(transformation: Transformation) -> str:

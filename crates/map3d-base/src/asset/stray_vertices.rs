@@ -5,9 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::Batch;
 use crate::vec3::{Vec3, length, sub};
 
-/// A vertex is not stray nearer to the rest of its object than this, nor than this many times the size of the rest.
+/// A vertex is not stray nearer to the rest of its object than this, nor than this many times the size of the rest, for objects of few and of many
+/// vertices.
 const LEAST_M: f64 = 1000.0;
-const TIMES_SIZE: f64 = 20.0;
+const TIMES_SIZE: [f64; 2] = [20.0, 4.0];
+const MANY_VERTICES: usize = 100;
 /// The build of a scene leaves out triangles that reach farther than this.
 const MOST_M: f64 = 100_000.0;
 /// An object with more vertices far from the rest is made so.
@@ -60,7 +62,8 @@ fn stray_vertices(batch: &Batch, triangles: &[usize]) -> BTreeSet<Key> {
     let middle = [0, 1, 2].map(|k| quantile(vertices.values().map(|p| p[k]).collect(), 2));
     let away = |p: Vec3| length(sub(p, middle));
     let usual_m = quantile(vertices.values().map(|p| away(*p)).collect(), 3);
-    let far: BTreeSet<Key> = vertices.iter().filter(|(_, p)| away(**p) >= LEAST_M.max(TIMES_SIZE * usual_m)).map(|(k, _)| *k).collect();
+    let least_m = LEAST_M.max(TIMES_SIZE[usize::from(vertices.len() >= MANY_VERTICES)] * usual_m);
+    let far: BTreeSet<Key> = vertices.iter().filter(|(_, p)| away(**p) >= least_m).map(|(k, _)| *k).collect();
     if far.len() > MAX_STRAYS { BTreeSet::new() } else { far }
 }
 
@@ -115,6 +118,14 @@ mod tests {
         let batch = fans(&[&HOUSE, &broken]);
         assert_eq!(kept(&batch), [true, true, true, true, false, false]);
         assert_eq!(leave_out_strays(&batch, &mut [true; 6]), (2, Some(1)));
+    }
+
+    #[test]
+    fn a_mesh_of_many_vertices_may_be_large() {
+        let mut town: Vec<Vec3> = (0..400).map(|k| [f64::from(k % 20) * 50.0, f64::from(k / 20) * 50.0, 0.0]).collect();
+        assert!(kept(&fans(&[&town])).iter().all(|k| *k));
+        town[210] = [500.0, 6000.0, 0.0];
+        assert_eq!(kept(&fans(&[&town])).iter().filter(|k| !**k).count(), 2);
     }
 
     #[test]

@@ -13,6 +13,7 @@ from rasterio.errors import RasterioError
 
 from map3d.errors import CrsError, ImportFailed
 from map3d.geometry.crs import is_local, parse_crs
+from map3d.ingest.exactness import stretch_findings
 from map3d.ingest.findings import finding
 from map3d.ingest.scene_crs import LOCAL, choose_scene_crs, to_scene_crs
 from map3d.ingest.terrain.placed_rasters import PlacedRasters
@@ -77,6 +78,9 @@ def _parse_placed(request: Mapping[str, Any], placed: PlacedRasters, report_prog
     placing = {"from": terrain["crs"] and CRS.from_user_input(terrain["crs"]).name, "to": proposed.name, **terrain["projection"]}
     if placement.place is not None:
         placing["place"] = str(placement.place)
+        if terrain["crs"] and target is not None:
+            at = (placement.place.lon, placement.place.lat)
+            terrain["findings"] += stretch_findings(CRS.from_user_input(terrain["crs"]), target, at)
     terrain["findings"] += [*placement.findings, *placed.findings]
     if far:
         path, away_m = far[0]

@@ -128,13 +128,12 @@ class TerrainRasters:
 
     def exactness(self) -> list[dict[str, Any]]:
         """Returns how exactly the rasters are transformed, as findings of a report."""
-        to_scene = [(self.base, self.scene_from_base, self._scene_crs)]
-        to_photo = [] if self.photo is None or self.ortho is None else [(self.base, self.photo_from_base, self.photo_georeference.crs)]
+        to_photo = [] if self.photo is None else [(self.photo_from_base, self.photo_georeference.crs)]
         found = []
-        for raster, plane, target in [*to_scene, *to_photo]:
+        for plane, target in [(self.scene_from_base, self._scene_crs), *to_photo]:
             if plane.transformation is not None and target is not None and self.georeference.crs is not None:
                 names = {"from": str(self.georeference.crs.name), "to": str(horizontal_crs(target).name)}
-                found += transformation_findings(plane.transformation, names, Path(raster.name).name)
+                found += transformation_findings(plane.transformation, names)
         return found
 
     def _checked(self, grid: VertexGrid, parts: int) -> VertexGrid:
