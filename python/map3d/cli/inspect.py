@@ -54,6 +54,8 @@ def _show(bar: Progress, task: Any) -> "OnFile":
 
 
 def _print(found: "Inspection") -> None:
+    from map3d.scenes.outlier_lines import outlier_lines
+
     if len(found.files) == 1:
         _print_one(found.files[0], found.crs)
     elif found.files:
@@ -61,6 +63,8 @@ def _print(found: "Inspection") -> None:
         _print_rows(_summary(found))
     for line in findings_lines(found.files):
         click.echo(line)
+    for message in outlier_lines(found.left_out, found.crs):
+        click.echo(message)
     for line in ignored_lines(found.ignored):
         click.echo(line)
     for _, reason in found.failed:

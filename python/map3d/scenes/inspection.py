@@ -8,10 +8,12 @@ from typing import Final
 
 from map3d.catalogue import Catalogue, SceneCrs, SceneRecord, Workspace
 from map3d.coherence.import_files import OnFile, import_files
-from map3d.ingest.content import Cluster, find_content
+from map3d.ingest.content import Cluster
 from map3d.ingest.import_options import ImportOptions
 from map3d.messages import Message
+from map3d.registry import Registry
 from map3d.scenes.file_contents import FileContents, file_contents, union
+from map3d.scenes.outliers import OutlierCheck, Outliers, read_outliers
 from map3d.types import Box
 
 _SCENE: Final = "inspect"
@@ -20,7 +22,8 @@ _SCENE: Final = "inspect"
 @dataclass(frozen=True)
 class Inspection:
     """`crs`: that of the scene which an import of the files makes; `box`: of all files, in that CRS. `clusters`: groups of content far from each
-    other, largest first; empty when everything is in one place. `failed`: (file, reason); `ignored`: (file, what it is)."""
+    other, largest first; empty when everything is in one place, without the strays in `left_out`. `failed`: (file, reason); `ignored`: (file, what it
+    is)."""
 
     crs: SceneCrs | None
     box: Box | None
@@ -28,6 +31,7 @@ class Inspection:
     clusters: tuple[Cluster, ...]
     failed: tuple[tuple[str, Message], ...]
     ignored: tuple[tuple[str, str], ...]
+    left_out: Outliers
 
 
 def inspect_files(paths: Sequence[Path], options: ImportOptions, progress: OnFile | None = None) -> Inspection:
@@ -40,15 +44,23 @@ def inspect_files(paths: Sequence[Path], options: ImportOptions, progress: OnFil
         with workspace.open_catalogue() as catalogue:
             catalogue.create_scene(SceneRecord(_SCENE))
             imported = import_files(workspace, catalogue, _SCENE, paths, options, progress=progress)
+            clusters = _find_clusters(workspace, catalogue)
             files = tuple(file_contents(workspace, catalogue, _SCENE))
-            clusters = _clusters(workspace, catalogue)
+            left_out = read_outliers(workspace, _SCENE)
             crs = catalogue.scene(_SCENE).crs
-    return Inspection(crs, union([file.box for file in files]), files, clusters, tuple(imported.failed), tuple(imported.ignored))
+    box = union([file.box for file in files])
+    return Inspection(crs, box, files, clusters, tuple(imported.failed), tuple(imported.ignored), left_out)
 
 
-def _clusters(workspace: Workspace, catalogue: Catalogue) -> tuple[Cluster, ...]:
-    origin = catalogue.scene(_SCENE).origin
-    if origin is None:
+def _find_clusters(workspace: Workspace, catalogue: Catalogue) -> tuple[Cluster, ...]:
+    """Returns the clusters if there are several; leaves out of a single one what a build does."""
+    scene = catalogue.scene(_SCENE)
+    if scene.origin is None:
         return ()
-    found = find_content([workspace.asset_folder(_SCENE, asset.name) for asset in catalogue.assets(_SCENE)], origin, {})
-    return found.clusters if len(found.clusters) > 1 else ()
+    check = OutlierCheck(workspace, scene, catalogue.assets(_SCENE), {})
+    if len(check.content.clusters) > 1:
+        return check.content.clusters
+    if check.content.extent is not None:
+        with Registry(workspace.registry_path(_SCENE)) as registry:
+            check.finish(registry)
+    return ()
