@@ -1,6 +1,7 @@
 """The errors of map3d: one base class with small subclasses. Every message says what failed, where, what was found and expected, and what to do.
 
-The command line exits with `exit_code`: 2 for an invalid request, 1 for a task that failed.
+The command line exits with `exit_code`: 2 for an invalid request, 1 for a task that failed; `map3d site` with 3 when it published although files
+could not be read.
 """
 
 from map3d.messages import Message

@@ -62,7 +62,7 @@ def test_a_folder_of_all_formats(tmp_path: Path, run: Run, temporary: Path) -> N
     assert found["crs"]["epsg"] == 25832
     assert [cluster["objects"] for cluster in found["clusters"]] == [17, 4]
     assert [Path(file).name for file, _ in found["failed"]] == ["cut.gml"]
-    assert [reason for _, reason in found["ignored"]] == ["CityJSON; convert it to CityGML with citygml-tools"]
+    assert [reason["text"] for _, reason in found["ignored"]] == ["CityJSON; convert it to CityGML with citygml-tools"]
     status, out, err = run("inspect", str(folder))
     assert status == 1
     assert "20 building (LoD 1)" in out

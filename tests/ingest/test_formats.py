@@ -110,7 +110,7 @@ def test_world_files_are_not_listed_as_ignored(tmp_path: Path, suffix: str) -> N
     write(tmp_path / "dem.tif", hills(4, 4))
     (tmp_path / f"dem{suffix}").write_text("1\n0\n0\n-1\n0\n0\n")
     ignored: list[Path] = []
-    find_sources([tmp_path], on_ignored=lambda path, _: ignored.append(path))
+    find_sources([tmp_path], on_note=lambda path, _: ignored.append(path))
     assert ignored == []
 
 

@@ -18,6 +18,7 @@ from map3d.catalogue import SceneRecord, Workspace
 from map3d.coherence.import_files import FilesImport, import_files
 from map3d.errors import ImportFailed
 from map3d.ingest.import_options import ImportOptions
+from map3d.messages import message
 from map3d.registry import Registry
 from map3d.site.files import ImportSummary, SiteFiles, update_files
 from tests.findings import skipped, warned
@@ -142,7 +143,7 @@ def test_a_document_of_heights_alone_is_terrain(tmp_path: Path) -> None:
     write_raster(city / "dem.tif")
     done, boxes = add(tmp_path, [write_model(city / "town.gml", house="")])
     assert [item.asset for item in done.imported] == ["dem"]
-    assert done.ignored == [(str(city / "town.gml"), "a grid of heights alone, which is read as terrain")]
+    assert done.ignored == [(str(city / "town.gml"), message("heights-alone"))]
     assert np.array_equal(boxes["dem"], GRID_BOX)
 
 
@@ -185,7 +186,7 @@ def test_a_site_names_an_image_that_is_no_raster(tmp_path: Path) -> None:
     (city / "dem.png").write_bytes(b"\x89PNG")
     summary = update(workspace, city)
     assert summary.imported == ["town"]
-    assert [(Path(file).name, "a PNG image without a world file" in reason) for file, reason in summary.failed] == [("dem.png", True)]
+    assert [(Path(file).name, "a PNG image without a world file" in str(reason)) for file, reason in summary.failed] == [("dem.png", True)]
 
     write_raster(city / ".hidden" / "dem.tif")
     write_model(city / "town.gml", file=".hidden/dem.tif")
@@ -218,4 +219,4 @@ def test_a_site_imports_the_raster_again_when_its_grid_changes(tmp_path: Path) -
     write_model(city / "town.gml", house="", origin=(EAST + 100.0, NORTH))
     summary = update(workspace, city)
     assert summary.unchanged == ["dem"]
-    assert summary.ignored == [("town.gml", "a grid of heights alone, which is read as terrain")]
+    assert summary.ignored == [("town.gml", message("heights-alone"))]

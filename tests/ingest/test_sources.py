@@ -5,21 +5,27 @@ from pathlib import Path
 import pytest
 
 from map3d.errors import NotFound, UnknownFormat
-from map3d.ingest.sources import asset_name, find_sources, source_digest
+from map3d.ingest.asset_names import asset_name
+from map3d.ingest.sources import find_sources, source_digest
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+def other(path: object) -> str:
+    """Returns an OBJ that no other path has: equal ones are read once."""
+    return f"{OBJ}# {path}\n"
 
 
 def fill(folder: Path) -> Path:
     for name in ("b.obj", "a/b.obj", "a/B.obj", "c d.obj"):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(OBJ)
+        (folder / name).write_text(other(name))
     (folder / "b.mtl").write_text("newmtl x\n")
     (folder / "notes.odt").write_text("nothing to read")
     (folder / ".hidden.obj").write_text(OBJ)
     for name in ("terrain/dem.tif", "terrain/ortho.tif"):
         (folder / name).parent.mkdir(exist_ok=True)
-        (folder / name).write_bytes(b"II*\0")
+        (folder / name).write_bytes(b"II*\0" + name.encode())
     return folder
 
 
@@ -40,11 +46,11 @@ def test_known_files_keep_their_names_when_others_are_added(tmp_path: Path, adde
     for path in ("b/town.obj", "c/town.obj", added):
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
     for path in ("b/town.obj", "c/town.obj"):
-        (tmp_path / path).write_text(OBJ)
+        (tmp_path / path).write_text(other(path))
     before = names(tmp_path)
     assert before == {"b/town.obj": "town", "c/town.obj": "town-2"}
     known = {name: tmp_path / path for path, name in before.items()}
-    (tmp_path / added).write_text(OBJ)
+    (tmp_path / added).write_text(other(added))
     after = names(tmp_path, known)
     assert after == before | {added: "a" if added == "a.obj" else "town-3"}
 
@@ -113,23 +119,24 @@ def test_unreadable_files_with_a_known_suffix_are_reported(tmp_path: Path) -> No
     for name, data in (("a/empty.gml", b""), ("words.OBJ", b"no lines of an OBJ"), ("page.xml", b"<html/>"), ("data.json", b"{}")):
         (tmp_path / name).write_bytes(data)
     reported: list[tuple[str, str]] = []
-    found = find_sources([tmp_path], None, lambda path, why: reported.append((path.name, why)))
+    found = find_sources([tmp_path], None, lambda path, why: reported.append((path.name, str(why))))
     assert len(found) == 5
     assert [name for name, _ in reported] == ["empty.gml", "words.OBJ"]
     assert [why.partition(";")[0].rpartition(": ")[2] for _, why in reported] == ["an empty file", "a file of unknown format"]
 
 
-def test_code_lists_that_a_file_names_are_not_ignored(tmp_path: Path) -> None:
+def test_code_lists_that_a_file_names_are_listed_as_used(tmp_path: Path) -> None:
     (tmp_path / "udx").mkdir()
     (tmp_path / "codelists").mkdir()
     uses = "".join(f"<usage codeSpace='../codelists/{name}'>1</usage>" for name in ("used.xml", "Named%20so.gml", "../../outside.xml"))
     (tmp_path / "udx" / "town.gml").write_text(f"<CityModel>{uses}</CityModel>")
     for name in ("used.xml", "Named so.gml", "unused.xml"):
         (tmp_path / "codelists" / name).write_text("<gml:Dictionary/>")
-    reported: list[str] = []
-    report = lambda path, _: reported.append(path.name)  # noqa: E731
+    reported: dict[str, str] = {}
+    report = lambda path, note: reported.update({path.name: note.code})  # noqa: E731
     (found,) = find_sources([tmp_path], None, report, report)
-    assert (found.name, reported) == ("town", ["unused.xml"])
+    used = dict.fromkeys(("used.xml", "Named so.gml"), "used-as-code-list")
+    assert (found.name, reported) == ("town", used | {"unused.xml": "format-ignored"})
     before = source_digest(found)
     (tmp_path / "codelists" / "used.xml").write_text("<gml:Dictionary gml:id='a'/>")
     assert source_digest(found) != before
@@ -161,7 +168,7 @@ def test_the_source_digest_covers_document_and_materials(tmp_path: Path) -> None
     seen = {source_digest(source)}
     (tmp_path / "other.mtl").write_text("newmtl x\n")
     seen.add(source_digest(source))
-    (tmp_path / "unrelated.obj").write_text(OBJ)
+    (tmp_path / "unrelated.obj").write_text(other("unrelated"))
     assert source_digest(source) in seen
     path.write_text("mtllib other.mtl\n" + OBJ + "f 3 2 1\n")
     seen.add(source_digest(source))

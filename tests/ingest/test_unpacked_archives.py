@@ -19,7 +19,7 @@ def test_archive_is_imported_like_a_folder_and_leaves_nothing(tmp_path: Path) ->
     workspace = Workspace(tmp_path / "ws").create()
     catalogue = workspace.open_catalogue()
     catalogue.create_scene(SceneRecord("town"))
-    archive = write_zip(tmp_path / "town.zip", {"a.obj": BOX, "deep/b.obj": BOX, "bad.gml": b"no GML"})
+    archive = write_zip(tmp_path / "town.zip", {"a.obj": BOX, "deep/b.obj": BOX + b"# another\n", "bad.gml": b"no GML"})
     done = import_files(workspace, catalogue, "town", [archive], ImportOptions(crs="local"))
     assert sorted(item.asset for item in done.imported) == ["a", "b"]
     assert [path for path, _ in done.failed] == [f"{archive}/bad.gml"]

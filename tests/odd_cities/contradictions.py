@@ -23,8 +23,8 @@ Size = tuple[float, float, float]
 @dataclass(frozen=True)
 class Row:
     """`build` writes a folder. What a build draws of it: `objects`, their number; `at`, the longitude and latitude of their middle; `size_m`, their
-    extent along x, y and z. `said`: the codes of all findings; `options`: of the import; `failed`: parts of the reasons for which files are
-    refused."""
+    extent along x, y and z. `said`: the codes of all findings, and of the notes about files that are no
+    documents; `options`: of the import; `failed`: parts of the reasons for which files are refused."""
 
     name: str
     build: Callable[[Path], Any]
@@ -69,7 +69,7 @@ def draw(folder: Path, options: Mapping[str, Any]) -> Drawn:
     low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
     to_degrees = Transformer.from_crs(horizontal_crs(parse_crs(scene.crs.wkt)), "EPSG:4326", always_xy=True)
     lon, lat = to_degrees.transform(*((low + high) / 2)[:2])
-    said = sorted({found.reason.code for asset in assets for found in findings(asset.report)})
+    said = sorted({found.reason.code for asset in assets for found in findings(asset.report)} | {note.code for _, note in done.ignored})
     x, y, z = high - low
     failed = tuple(str(reason) for _, reason in done.failed)
     left_out = sum(sum(outside) for _, outside in within)

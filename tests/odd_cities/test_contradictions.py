@@ -7,9 +7,10 @@ import pytest
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
 from tests.odd_cities.contradictions import Row, check
+from tests.odd_cities.rows_of_files import FILES
 from tests.odd_cities.rows_of_plan import PLAN
 
-ROWS: list[Row] = [*PLAN]
+ROWS: list[Row] = [*PLAN, *FILES]
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[row.name for row in ROWS])

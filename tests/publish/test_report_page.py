@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from map3d.catalogue import Workspace
+from map3d.ingest.file_notes import unread
 from map3d.ingest.findings import Finding
 from map3d.messages import message
 from map3d.publish.page_head import VIEWER_POLICY
@@ -42,7 +43,7 @@ REPORT = SiteReport(
     box=BOX,
     files=(TOWN, TERRAIN),
     failed=(("/data/cut.gml", "document broken at byte 17"),),
-    ignored=(("town.json", "CityJSON"),),
+    ignored=(("town.json", unread("CityJSON")), ("a.jpg", message("used-as-texture", of="town.gml"))),
     left_out=("left out 3 triangles",),
     views=("45-45",),
     res_m=0.1,
@@ -101,7 +102,7 @@ def test_the_page_accounts_for_everything() -> None:
         "2,468 building part (LoD 2)", "0.1 m per pixel, since finer pixels show nothing more", "took 4 min with 2 workers",
         "Skipped polygons without area: 7.town.gml: house-1", "The file breaks off; what comes before is kept.town.gml: 11.5 48.1",
         "left out 3 triangles",
-        "not importedcut.gmldocument broken at byte 17", "ignoredtown.jsonCityJSON",
+        "not importedcut.gmldocument broken at byte 17", "ignoredtown.jsonCityJSON", "useda.jpgtexture of town.gml",
         "CityGML, 12.3 kB", "dem (5 rasters)", "4 rasters of elevation and 1 raster of imagery",
         "3 triangles far from the rest", "../textures/a.jpg, …",
     ):  # fmt: skip
@@ -129,8 +130,8 @@ def test_names_from_files_are_text() -> None:
     textures = Textures(646, 645, (HOSTILE,))
     town = replace(TOWN, asset=HOSTILE, source=HOSTILE, crs=HOSTILE, place=HOSTILE, kinds=kinds, textures=textures, findings=findings)
     hostile = replace(
-        REPORT, title=HOSTILE, crs=HOSTILE, place=HOSTILE, files=(town, TERRAIN), failed=((HOSTILE, HOSTILE),), ignored=((HOSTILE, HOSTILE),),
-        left_out=(HOSTILE,), why=HOSTILE,
+        REPORT, title=HOSTILE, crs=HOSTILE, place=HOSTILE, files=(town, TERRAIN), failed=((HOSTILE, HOSTILE),),
+        ignored=((HOSTILE, unread(HOSTILE)), (HOSTILE, message("left-backup", of=HOSTILE))), left_out=(HOSTILE,), why=HOSTILE,
     )  # fmt: skip
     page = Elements(report_page(hostile, 4_000, 5_000_000))
     assert page.names == Elements(report_page(REPORT, 4_000, 5_000_000)).names

@@ -90,7 +90,7 @@ def test_renamed_file_is_not_drawn_twice(site: Site, folder: Path) -> None:
 
 
 def test_file_keeps_its_number_when_the_one_before_it_leaves(site: Site, folder: Path) -> None:
-    shutil.copy(folder / "north" / "b.obj", folder / "north" / "a.obj")
+    (folder / "north" / "a.obj").write_text(house(200.0, 0.0, 6.0))
     assert site.update(folder).imported == ["a", "a-2", "b", "c"]
     (folder / "a.obj").unlink()
     summary = site.update(folder)

@@ -39,7 +39,7 @@ def properties(*names: str) -> dict[str, Any]:
 
 
 NEW_SCENE = properties("NewScene") | properties("NewScene")["options"]["properties"]
-EXACT = {"sun", "place", "window"}
+EXACT = {"sun", "place", "window", "offset"}
 """Lists of as many numbers as the value has."""
 IMPORT = ARGUMENTS["import"]["properties"]["options"]["properties"]
 VERBS = [

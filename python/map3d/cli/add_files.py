@@ -10,10 +10,11 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from map3d.catalogue import Workspace
 from map3d.catalogue.records import LOCAL_CRS_NAME
 from map3d.cli.from_request import request_options
-from map3d.cli.import_reports import asset_warning_lines, ignored_lines, place_line
+from map3d.cli.import_reports import asset_warning_lines, place_line
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import print_json, print_table
 from map3d.cli.progress import progress_bar
+from map3d.ingest.file_notes import FileNote, note_lines
 from map3d.ingest.findings import skipped_count
 from map3d.messages import Message
 from map3d.requests import AddFiles
@@ -60,15 +61,15 @@ def _show(bar: Progress, task: Any) -> "OnFile":
     return show
 
 
-def _print(place: str | None, scene: str, done: Sequence[Any], failed: Sequence[tuple[str, Message]], ignored: Sequence[tuple[str, str]]) -> None:
+def _print(place: str | None, scene: str, done: Sequence[Any], failed: Sequence[tuple[str, Message]], ignored: Sequence[FileNote]) -> None:
     rows = [(item.asset, item.format, item.objects, item.triangles, skipped_count(item.report), _placed(item.report)) for item in done]
     if rows:
         print_table(("asset", "format", "objects", "triangles", "skipped", "coordinates"), rows)
     for item in done:
         for line in asset_warning_lines(item.asset, item.report):
             click.echo(line)
-    for line in ignored_lines(ignored):
-        click.echo(line)
+    for note in note_lines(ignored):
+        click.echo(str(note))
     for _, text in failed:
         click.echo(f"not imported: {text}", err=True)
     if done:

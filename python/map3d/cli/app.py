@@ -93,7 +93,7 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Runs the command line and exits: 0 success, 1 failure, 2 invalid request, 130 interrupted."""
+    """Runs the command line and exits: 0 success, 1 failure, 2 invalid request, 3 published although files could not be read, 130 interrupted."""
     sys.exit(run(sys.argv[1:]))
 
 

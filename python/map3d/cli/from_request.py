@@ -12,6 +12,7 @@ from map3d.cli.option_types import Bytes, CommaList, IsoDate, IsoTime, Numbers, 
 from map3d.cli.options import Command
 from map3d.geometry.sun import GeographicPosition, SunAngles
 from map3d.requests.param import RequestField, fields_of, help_text
+from map3d.requests.reading import ModelOffset
 from map3d.requests.renderings import Window
 from map3d.requests.scenes import Style
 from map3d.types import ViewAngles
@@ -27,6 +28,7 @@ _TYPES: Final[Mapping[Any, Any]] = {
     SunAngles: Numbers("azimuth,elevation", "two numbers in degrees, e.g. 195,60", SunAngles),
     GeographicPosition: Numbers("latitude,longitude", "two numbers in degrees, e.g. 48.76,11.42", GeographicPosition),
     Window: Numbers("x,y,size", "X,Y,SIZE in metres, e.g. 691000,5336000,2000", lambda x, y, size: (x, y, size)),
+    ModelOffset: Numbers("x,y,z", "X,Y,Z, e.g. 691000,5336000,500", ModelOffset),
     Style: StyleFile(),
     ViewAngles: View(),
     tuple[str, ...]: CommaList(),

@@ -1,13 +1,11 @@
 """Lines about imports, for people: what the import reports of a scene warn about, and where on Earth the scene is."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
 from map3d.catalogue import Catalogue, Workspace
-from map3d.cli.output import names_text
 from map3d.ingest.findings import findings, sum_findings
-from map3d.ingest.relief_grids import AS_TERRAIN
 
 MAX_LINES: Final = 20
 
@@ -35,18 +33,6 @@ def missing_textures_line(reports: Mapping[str, Mapping[str, Any]]) -> str | Non
     asset = next(iter(counts))
     example = next(iter(reports[asset].get("missing_files", [])), "")
     return f"{missing:,} of {images:,} textures missing, e.g. {asset}: {example}; they must be in the given folder or below"
-
-
-def ignored_lines(ignored: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Yields a line for each kind of file that map3d does not read, and for files that are terrain alone."""
-    by_reason: dict[str, list[str]] = {}
-    for file, reason in ignored:
-        by_reason.setdefault(reason, []).append(file)
-    for reason, files in sorted(by_reason.items()):
-        if reason == AS_TERRAIN:
-            yield f"no objects in {names_text(files)}: {reason}"
-        else:
-            yield f"ignored (unsupported format): {names_text(files)} ({reason})"
 
 
 def asset_warning_lines(asset: str, report: Mapping[str, Any], limit: int = 8) -> Iterator[str]:

@@ -9,10 +9,10 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from map3d.cli.file_tables import MAX_ROWS, findings_lines, kinds_text, print_files, textures_text
 from map3d.cli.from_request import request_options
-from map3d.cli.import_reports import ignored_lines
 from map3d.cli.options import json_option
 from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.progress import progress_bar
+from map3d.ingest.file_notes import note_lines
 from map3d.messages import Message
 from map3d.requests import Inspect
 
@@ -65,8 +65,8 @@ def _print(found: "Inspection") -> None:
         click.echo(line)
     for message in outlier_lines(found.left_out, found.crs):
         click.echo(message)
-    for line in ignored_lines(found.ignored):
-        click.echo(line)
+    for note in note_lines(found.ignored):
+        click.echo(str(note))
     for _, reason in found.failed:
         click.echo(f"not readable: {reason}", err=True)
 

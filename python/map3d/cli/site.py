@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
@@ -11,18 +11,23 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
 from map3d.catalogue import Catalogue, Workspace
 from map3d.cli.building import build_with_progress
 from map3d.cli.from_request import request_options
-from map3d.cli.import_reports import ignored_lines, missing_textures_line, place_line, warning_lines
+from map3d.cli.import_reports import missing_textures_line, place_line, warning_lines
 from map3d.cli.options import workspace_option
 from map3d.cli.output import names_text, plural, size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
-from map3d.ingest.findings import skipped_count, warning_count
+from map3d.ingest.file_notes import note_lines
+from map3d.ingest.findings import failed_count, skipped_count, warning_count
 from map3d.messages import Message
 from map3d.requests import Site
 
 if TYPE_CHECKING:
     from map3d.site.files import ImportSummary
+
+
+PUBLISHED_IN_PART: Final = 3
+"""Exit code: the site is published, and files could not be read."""
 
 
 @click.command("site")
@@ -32,10 +37,11 @@ def command(workspace: Workspace, request: Site) -> None:
     """Turn all files in FOLDER into a static web site: import, build, render, publish.
 
     You can stop it at any time; re-run it to resume. Re-run it after files change; only the changes are processed. Files that have left FOLDER leave
-    the site; files are imported again when they, the options or the reader change.
+    the site; files are imported again when they, the options or the reader change. Exits with 3 if the site was published but files of FOLDER could
+    not be read.
     """
     from map3d.cli.site_extents import print_estimate, print_extents, print_rendering
-    from map3d.ingest.sources import asset_name
+    from map3d.ingest.asset_names import asset_name
     from map3d.jobs.run import Run
     from map3d.jobs.run_settings import RunSettings
     from map3d.publish import check_folder
@@ -51,6 +57,7 @@ def command(workspace: Workspace, request: Site) -> None:
     request = replace(request, name=request.name or asset_name(folder_name), title=request.title or folder_name)
     with workspace.create().open_catalogue() as catalogue:
         summary = _update_files(workspace, catalogue, request)
+        failed = len(summary.failed) + sum(failed_count(asset.report) for asset in catalogue.assets(request.name))
         if not catalogue.assets(request.name):
             click.echo(f"the scene {request.name} has no files left; {out} stays as it was published")
             return
@@ -71,6 +78,9 @@ def command(workspace: Workspace, request: Site) -> None:
     done = publish_with_progress(workspace, record.name, out, replace=True)
     click.echo(f"wrote the site to {out}, {size_text(done.bytes)}; copy it to any web server that supports range requests")
     click.echo(f"report: {out / REPORT_PAGE} says what the files hold and what was skipped")
+    if failed:
+        click.echo(f"published, but {plural(failed, 'file')} could not be read, or not as a whole", err=True)
+        raise click.exceptions.Exit(PUBLISHED_IN_PART)
 
 
 def _update_files(workspace: Workspace, catalogue: Catalogue, request: Site) -> "ImportSummary":
@@ -102,10 +112,10 @@ def _print_summary(summary: "ImportSummary") -> None:
         click.echo(f"removed, since no longer in the folder: {names_text(summary.removed)}")
     if summary.elsewhere:
         click.echo(f"kept, since not from this folder: {names_text(summary.elsewhere)}; map3d remove-files removes them")
-    for line in ignored_lines(summary.ignored):
-        click.echo(line)
-    for _, reason in summary.failed:
-        click.echo(f"not imported: {reason}", err=True)
+    for note in note_lines(summary.ignored):
+        click.echo(str(note))
+    for _, error in summary.failed:
+        click.echo(f"not imported: {error}", err=True)
 
 
 def _print_problems(workspace: Workspace, catalogue: Catalogue, scene: str) -> None:

@@ -10,15 +10,16 @@ from map3d.coherence.plan import plan_import
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.formats.raster import RASTER
 from map3d.ingest.asset_removal import removed_files
+from map3d.ingest.file_notes import HEIGHTS_ALONE, FileNote
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported, OnlyGrids, import_file, workspace_key
 from map3d.ingest.parser_process import ParserProcess
-from map3d.ingest.relief_grids import AS_TERRAIN, ReliefGrids
+from map3d.ingest.relief_grids import ReliefGrids
 from map3d.ingest.sources import SourceDocument, find_sources
 from map3d.ingest.unfinished_imports import finish_imports
-from map3d.ingest.unpacked_archives import unpacked
-from map3d.messages import Message, verbatim
+from map3d.ingest.unpacked_archives import UnpackedFiles, unpacked
+from map3d.messages import Message, message, verbatim
 
 OnFile = Callable[[str, int, int, Message | None], None]
 """Called with the name of the current file, the number of files before it, the number of all files, and what was read of it so far."""
@@ -26,13 +27,13 @@ OnFile = Callable[[str, int, int, Message | None], None]
 
 @dataclass(frozen=True)
 class FilesImport:
-    """`unchanged`: names of assets that were up to date and not imported again; `failed`: (file, reason); `ignored`: (file, what it
-    is) for files of the folders that map3d does not read."""
+    """`unchanged`: names of assets that were up to date and not imported again; `failed`: (file, reason); `ignored`: files of the folders that are no
+    documents of their own."""
 
     imported: list[Imported] = field(default_factory=list)
     unchanged: list[str] = field(default_factory=list)
     failed: list[tuple[str, Message]] = field(default_factory=list)
-    ignored: list[tuple[str, str]] = field(default_factory=list)
+    ignored: list[FileNote] = field(default_factory=list)
 
 
 def import_files(
@@ -44,7 +45,7 @@ def import_files(
     *,
     progress: OnFile | None = None,
 ) -> FilesImport:
-    """Imports the files, and all files in known formats of the folders and ZIP archives.
+    """Imports the files, and all files in known formats of the folders and ZIP archives, also of archives in the folders.
 
     `options.skip_unchanged`: leaves assets alone whose files, options and reader are the same as at their import.
 
@@ -53,11 +54,10 @@ def import_files(
     """
     catalogue.scene(scene)
     with unpacked(workspace, scene, files, progress or (lambda *_: None)) as found:
-        archives = {folder for folder, _ in found.archives}
-        virtual = [path for path in found.paths if options.virtual_rasters and path not in archives]
-        done = _import_files(workspace, catalogue, scene, found.paths, virtual, options, progress)
+        virtual = [path for path in files if options.virtual_rasters and path in found.paths]
+        done = _import_files(workspace, catalogue, scene, found, virtual, options, progress)
         failed = [(found.original(path), reason.map_texts(found.original)) for path, reason in done.failed]
-        ignored = [(found.original(path), found.original(reason)) for path, reason in done.ignored]
+        ignored = [(found.original(path), note) for path, note in done.ignored]
         return FilesImport(done.imported, done.unchanged, failed, ignored)
 
 
@@ -65,7 +65,7 @@ def _import_files(
     workspace: Workspace,
     catalogue: Catalogue,
     scene: str,
-    files: Sequence[Path],
+    found: UnpackedFiles,
     virtual: Sequence[Path],
     options: ImportOptions,
     progress: OnFile | None,
@@ -73,14 +73,15 @@ def _import_files(
     result = FilesImport()
     assets = catalogue.assets(scene)
     sources = find_sources(
-        files,
+        found.paths,
         options.name,
-        lambda path, reason: result.failed.append((str(path), verbatim(reason))),
-        lambda path, reason: result.ignored.append((str(path), reason)),
+        lambda path, reason: result.failed.append((str(path), reason)),
+        lambda path, note: result.ignored.append((str(path), note)),
         {asset.name: Path(asset.source) for asset in assets},
         virtual,
-        _taken_names(workspace, assets, files),
+        _taken_names(workspace, assets, found.paths),
         removed_files(workspace, scene),
+        found,
     )
     if result.failed and options.strict:
         raise UnknownFormat(result.failed[0][1])
@@ -113,7 +114,7 @@ def _import_files(
                     grids.collect(done.report.get("grids", ()))
             except OnlyGrids as found:
                 grids.collect(found.grids)
-                result.ignored.append((str(source.paths[0]), AS_TERRAIN))
+                result.ignored.append((str(source.paths[0]), message(HEIGHTS_ALONE)))
             except Map3dError as error:
                 if options.strict or (is_single and not result.imported and not result.unchanged):
                     raise

@@ -9,12 +9,15 @@ from typing import Final
 from map3d import _core
 from map3d.formats.citygml_links import find_document_links, find_geometry_documents
 from map3d.formats.file_names import MAX_NAME_BYTES, FileNames, existing_files, match, missing, names_in
-from map3d.formats.source_format import LinkedDocuments, MissingFiles, SourceFormat
+from map3d.formats.source_format import IMAGE_SUFFIXES, LinkedDocuments, MissingFiles, SourceFormat
 
 _NAME: Final = "citygml"
 # Every pattern is bounded or excludes what follows it, so that a hostile file costs no more than its length.
 _TAGS: Final = (b"imageURI>", b"textureMap>", b"libraryObject>", b"fileName>", b"fileReference>")
 _IMAGE_TAGS: Final = _TAGS[:2]
+_LIBRARY_TAGS: Final = _TAGS[2:3]
+_MODEL_SUFFIXES: Final = (".gml", ".xml", ".obj")
+"""Those of libraries that are read."""
 _CODE_LIST: Final = re.compile(rb"""codeSpace=["']([^"'<>]{1,4096}\.(?:xml|gml))["']""", re.IGNORECASE)
 
 
@@ -33,9 +36,19 @@ def _find_missing(path: Path, root: Path | None = None) -> MissingFiles:
     return MissingFiles(sorted(missing(path, _find_elements, folders)), len(images), len(missing_images))
 
 
-def _find_used(path: Path, root: Path | None = None) -> set[Path]:
-    """Returns the code lists and libraries of geometry that a document names; they are read with it."""
-    return _find_code_lists(path, root) | find_geometry_documents(path, root)
+def _find_used(path: Path, root: Path | None = None) -> dict[Path, str]:
+    """Returns the textures, code lists and libraries of geometry that a document names; they are read with it."""
+    folders = [FileNames.of(path, root)]
+    models = {file for file in existing_files(path, _find_libraries, folders) if file.suffix.lower() in _MODEL_SUFFIXES}
+    return {
+        **dict.fromkeys(models | find_geometry_documents(path, root), "used-as-geometry"),
+        **dict.fromkeys(_find_code_lists(path, root), "used-as-code-list"),
+        **dict.fromkeys(existing_files(path, _find_images, folders), "used-as-texture"),
+    }
+
+
+def _find_libraries(text: mmap | bytes) -> Iterator[bytes]:
+    return _find_elements(text, _LIBRARY_TAGS)
 
 
 def _find_images(text: mmap | bytes) -> Iterator[bytes]:
@@ -69,5 +82,7 @@ CITYGML: Final = SourceFormat(
     names_files=True,
     find_files=_find_files,
     find_missing=_find_missing,
-    links=LinkedDocuments(find_document_links, find_geometry_documents, _find_used, (".xml", ".gml")),
+    find_used=_find_used,
+    used_suffixes=(".xml", ".gml", ".obj", *IMAGE_SUFFIXES),
+    links=LinkedDocuments(find_document_links, find_geometry_documents),
 )

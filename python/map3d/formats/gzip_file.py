@@ -63,8 +63,12 @@ def content_windows(path: Path, overlap: int) -> Iterator[bytes]:
     yield bytes(window)
 
 
+def content_parts(path: Path) -> Iterator[bytes]:
+    """Yields the content of a packed file up to its end or the damage. Raises LimitExceeded like `content_bytes`."""
+    yield from _parts(path, _PART_BYTES)
+
+
 def _parts(path: Path, size: int) -> Iterator[bytes]:
-    """Yields the content up to the end or the damage."""
     count, packed = 0, path.stat().st_size
     with path.open("rb") as file, gzip.GzipFile(fileobj=file) as content:
         while part := _read(content, size):

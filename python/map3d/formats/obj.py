@@ -6,7 +6,8 @@ from typing import Final
 
 from map3d import _core
 from map3d.formats.file_names import FileNames, existing_files, match, missing, names_in
-from map3d.formats.source_format import MissingFiles, SourceFormat
+from map3d.formats.model_place import find_model_place
+from map3d.formats.source_format import IMAGE_SUFFIXES, MissingFiles, SourceFormat
 
 _NAME: Final = "obj"
 # Every pattern is bounded, so that a hostile file costs no more than its length.
@@ -15,14 +16,32 @@ _IMAGES: Final = match(re.compile(rb"^[ \t]{0,64}(?:map_\w{1,16}|bump|disp|decal
 
 
 def _find_files(path: Path, root: Path | None = None) -> set[Path]:
+    return _find_libraries(path, root) | _find_images(path, root) | _find_places(path, root)
+
+
+def _find_libraries(path: Path, root: Path | None) -> set[Path]:
+    return set(existing_files(path, _LIBRARIES, [FileNames.of(path, root)]))
+
+
+def _find_images(path: Path, root: Path | None) -> set[Path]:
     folder = FileNames.of(path, root)
-    libraries = set(existing_files(path, _LIBRARIES, [folder]))
-    return libraries | {image for library in libraries for image in existing_files(library, _IMAGES, [folder.beside(library), folder])}
+    libraries = _find_libraries(path, root)
+    return {image for library in libraries for image in existing_files(library, _IMAGES, [folder.beside(library), folder])}
+
+
+def _find_places(path: Path, root: Path | None = None) -> set[Path]:
+    """Returns the files that say where a model lies."""
+    place = find_model_place(path, root)
+    return set() if place is None else {file.resolve() for file in place.files}
+
+
+def _find_used(path: Path, root: Path | None = None) -> dict[Path, str]:
+    return {**dict.fromkeys(_find_places(path, root), "used-as-place"), **dict.fromkeys(_find_images(path, root), "used-as-texture")}
 
 
 def _find_missing(path: Path, root: Path | None = None) -> MissingFiles:
     folder = FileNames.of(path, root)
-    libraries = set(existing_files(path, _LIBRARIES, [folder]))
+    libraries = _find_libraries(path, root)
     images, missing_images = set[str](), set[str]()
     for library in libraries:
         images |= names_in(library, _IMAGES)
@@ -41,8 +60,13 @@ OBJ: Final = SourceFormat(
     suffixes=(".obj",),
     companions=(".mtl", ".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga"),
     options=("up", "split", "transparency"),
+    sparse_options=("offset", "unit"),
     has_crs=False,
     names_files=True,
     find_files=_find_files,
     find_missing=_find_missing,
+    find_used=_find_used,
+    used_suffixes=(".xyz", ".xml", *IMAGE_SUFFIXES),
+    find_places=_find_places,
+    find_place=find_model_place,
 )

@@ -52,6 +52,13 @@ def has_world_file(path: Path, head: bytes) -> bool:
     return any(path.with_suffix(case(suffix)).is_file() for suffix in format.world_files for case in (str.lower, str.upper))
 
 
+def _find_places(path: Path) -> set[Path]:
+    """Returns the world file, the coordinate system and the metadata of GDAL beside a raster."""
+    suffixes = (".prj", ".aux.xml", *(suffix for format in RASTER_FORMATS for suffix in format.world_files))
+    names = [path.with_suffix(case(suffix)) for suffix in suffixes for case in (str.lower, str.upper)]
+    return {place for place in [*names, path.with_name(f"{path.name}.aux.xml")] if place.is_file()}
+
+
 def _detect(head: bytes, path: Path) -> bool:
     format = find_raster_format(head)
     return format is not None and (not format.is_image or has_world_file(path, head))
@@ -62,13 +69,14 @@ RASTER: Final = SourceFormat(
     title="Terrain",
     readable="elevation and image rasters (.tif, .jp2, .asc; .jpg and .png with a world file)",
     uploads="GeoTIFF",
-    version=4,
+    version=5,
     detect=_detect,
     parser="map3d.ingest.terrain.parse_terrain:open_terrain_parser",
     suffixes=tuple(suffix for format in RASTER_FORMATS for suffix in format.suffixes),
     companions=(".prj", *(suffix for format in RASTER_FORMATS for suffix in format.world_files)),
     detect_companion=lambda head, path: has_world_file(path, head),
-    sparse_options=("max_error_m",),
+    sparse_options=("max_error_m", "elevation"),
+    find_places=_find_places,
     is_grouped=True,
     has_checkpoints=True,
     cpu_s=600,

@@ -1,11 +1,15 @@
 """What the list of formats says of each."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from map3d.formats.model_place import ModelPlace
+
 GIB: Final = 1 << 30
+IMAGE_SUFFIXES: Final = (".tif", ".tiff", ".jp2", ".jpg", ".jpeg", ".png")
+"""Suffixes of textures that may be rasters of their own, too."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +38,10 @@ FindFiles = Callable[[Path, Path | None], set[Path]]
 @dataclass(frozen=True)
 class LinkedDocuments:
     """How documents of a format refer to each other. `find_links`: the links of a document; `find_geometry_documents`: the documents whose geometry
-    it draws, also by way of others. `find_used`: files of the `used_suffixes` that are read with a document and are no documents themselves."""
+    it draws, also by way of others."""
 
     find_links: Callable[[Path, Path | None], DocumentLinks]
     find_geometry_documents: FindFiles
-    find_used: FindFiles
-    used_suffixes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -57,8 +59,10 @@ class SourceFormat:
     `options`: those of an import that the reader has; of `sparse_options`, an asset records only what differs from the default, since the reader had
     them later. `has_crs`: files name their coordinate system; of others it may be unknown. `is_grouped`: the files of a folder are one source.
     `names_files`: documents name other files, in the folder that was given; `find_files` finds those that are there, `find_missing` those that are
-    not. `links`: documents refer to each other. `has_checkpoints`: a broken import resumes from its checkpoints. `cpu_s`: processor time for
-    each 100 MB or part of it; `memory_bytes`: for files up to that size."""
+    not. `find_used`: the files of the `used_suffixes` that are read with a document and are no documents of their own → code of the message that
+    says what for. `find_places`: files that say where a file lies; `find_place`: what they say of a model. `links`: documents refer to each other.
+    `has_checkpoints`: a broken import resumes from its checkpoints. `cpu_s`: processor time for each 100 MB or part of it; `memory_bytes`: for
+    files up to that size."""
 
     name: str
     title: str
@@ -77,6 +81,10 @@ class SourceFormat:
     names_files: bool = False
     find_files: FindFiles = lambda _path, _root: set()
     find_missing: Callable[[Path, Path | None], MissingFiles] = lambda _path, _root: MissingFiles([], 0, 0)
+    find_used: Callable[[Path, Path | None], Mapping[Path, str]] = lambda _path, _root: {}
+    used_suffixes: tuple[str, ...] = ()
+    find_places: Callable[[Path], set[Path]] = lambda _path: set()
+    find_place: Callable[[Path, Path | None], ModelPlace | None] = lambda _path, _root: None
     links: LinkedDocuments | None = None
     has_checkpoints: bool = False
     cpu_s: int = 60

@@ -43,6 +43,11 @@ class Finding:
         return bool(table().get(self.reason.code, {}).get("whole_file"))
 
     @property
+    def failed_file(self) -> bool:
+        """Whether it is said of files that could not be read, or not as a whole."""
+        return bool(table().get(self.reason.code, {}).get("failed_file"))
+
+    @property
     def order(self) -> tuple[Any, ...]:
         """Sorts what is said of whole files first, then what was skipped, then by count."""
         return (not self.whole_file, not self.skipped, -self.count, str(self.reason))
@@ -80,6 +85,11 @@ def skipped_count(report: Mapping[str, Any]) -> int:
 
 def warning_count(report: Mapping[str, Any]) -> int:
     return sum(item.count for item in findings(report) if not item.skipped)
+
+
+def failed_count(report: Mapping[str, Any]) -> int:
+    """Returns how many files of an asset, such as rasters of a terrain, could not be read, or not as a whole."""
+    return sum(item.count for item in findings(report) if item.failed_file)
 
 
 def _earlier(report: Mapping[str, Any]) -> Iterator[Finding]:

@@ -39,7 +39,8 @@ class ImportOptions(AddFiles):
         """Returns the options of the core's Reader."""
         known = find_format(format)
         options: dict[str, Any] = {"strict": self.strict} | {name: getattr(self, name) for name in known.options}
-        options |= {name: value for name in known.sparse_options if (value := getattr(self, name)) != getattr(type(self), name)}
+        sparse = {name: value for name in known.sparse_options if (value := getattr(self, name)) != getattr(type(self), name)}
+        options |= {name: list(value) if isinstance(value, tuple) else value for name, value in sparse.items()}
         if limits.address_space_bytes is not None:
             options |= {"max_object_bytes": limits.address_space_bytes // 4, "max_appearance_bytes": limits.address_space_bytes // 4}
         return options

@@ -17,13 +17,14 @@ from map3d.errors import CrsError, ImportFailed, LimitExceeded, Map3dError, Subp
 from map3d.formats import find_format
 from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_objects, world_boxes, write_ids, write_report
 from map3d.ingest.content import find_content
+from map3d.ingest.file_notes import HEIGHTS_ALONE
 from map3d.ingest.findings import findings
 from map3d.ingest.import_checkpoints import checkpoints_key, import_checkpoints
 from map3d.ingest.import_inputs import ImportInputs, import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.import_progress import ImportProgress
 from map3d.ingest.parser_process import ParserProcess
-from map3d.ingest.relief_grids import AS_TERRAIN, Grid
+from map3d.ingest.relief_grids import Grid
 from map3d.ingest.scene_crs import LOCAL
 from map3d.ingest.sources import SourceDocument
 from map3d.ingest.unfinished_imports import draft_path, finish_imports, mark_import, remove_dead_drafts, unmark_import
@@ -59,7 +60,7 @@ class Imported:
 class OnlyGrids(ImportFailed):
     """The document has nothing to draw but rasters of reliefs, which are imported as terrain; it is no asset."""
 
-    def __init__(self, message: str, grids: Sequence[Grid]) -> None:
+    def __init__(self, message: Message, grids: Sequence[Grid]) -> None:
         super().__init__(message)
         self.grids = grids
 
@@ -95,7 +96,7 @@ def import_file(
                 parsed = _parse(record, source, options, draft, checkpoints, progress, running, entry or find_format(source.format).parser)
             report = parsed["report"]
             if not report["triangles"] and report.get("grids"):
-                raise OnlyGrids(f"{source.paths[0]}: {AS_TERRAIN}", report["grids"])
+                raise OnlyGrids(message("about", what=str(source.paths[0]), message=message(HEIGHTS_ALONE)), report["grids"])
             if not report["triangles"]:
                 raise ImportFailed(_without_triangles(source, report))
             with scene_lock(workspace, scene):
@@ -111,7 +112,7 @@ def _checkpoints(record: SceneRecord, source: SourceDocument, final: Path, input
     if not find_format(source.format).has_checkpoints:
         return nullcontext()
     options = {name: value for name, value in inputs.options.items() if name not in _NOT_IN_PIECES}
-    paths = [str(path.absolute()) for path in source.paths]
+    paths = [str(path.absolute()) for path in source.places or source.paths]
     key = {"files": inputs.files, "paths": paths, "options": options, "reader": inputs.reader, "scene_crs": _crs_text(record.crs)}
     return import_checkpoints(final, checkpoints_key(key))
 
@@ -141,6 +142,7 @@ def _parse(
         "checkpoints": None if checkpoints is None else str(checkpoints.absolute()),
         "cores": usable_cores(),
         "grids": {str(path.absolute()): grid for path, grid in source.grids.items()},
+        "place": _place(source),
         "virtual": {str(path.absolute()): str(folder.absolute()) for path, folder in source.virtual_folders.items()},
     }
     shown = ImportProgress()
@@ -177,7 +179,7 @@ def _add_to_scene(
     record = _pin_scene(catalogue, before, proposed, usual)
     assert record.origin is not None, "the scene is pinned"
     _check_distance(source, usual, record.origin)
-    final, path = workspace.asset_folder(scene, source.name), str(source.paths[0].absolute())
+    final, path = workspace.asset_folder(scene, source.name), str(source.place.absolute())
     mark_import(final, path, source.format, inputs.digest)
     with Registry(workspace.registry_path(scene)) as registry:
         ids = registry.put_asset(source.name, new_objects(lines, boxes, record.origin))
@@ -190,7 +192,7 @@ def _add_to_scene(
     put_in_place(draft, final)
     catalogue.put_asset(AssetRecord(scene, source.name, path, source.format, digest, inputs.digest, report))
     unmark_import(final)
-    return Imported(source.name, str(source.paths[0]), source.format, len(lines), report["triangles"], replaced, report)
+    return Imported(source.name, str(source.place), source.format, len(lines), report["triangles"], replaced, report)
 
 
 def workspace_key(workspace: Workspace) -> str:
@@ -203,6 +205,15 @@ def _folder_options(source: SourceDocument) -> dict[str, Any]:
     appearances for the document."""
     folder = {"folder": str(source.root.absolute())} if source.root is not None and find_format(source.format).names_files else {}
     return folder | ({"appearance_files": [str(path.absolute()) for path in source.appearances]} if source.appearances else {})
+
+
+def _place(source: SourceDocument) -> dict[str, Any] | None:
+    """Returns what files beside a model say of its place."""
+    found = find_format(source.format).find_place(source.paths[0], source.root)
+    if found is None:
+        return None
+    unreadable = None if found.unreadable is None else found.unreadable.name
+    return {"offset": found.offset, "crs": found.crs, "files": [path.name for path in found.files], "unreadable": unreadable}
 
 
 def _missing_files(source: SourceDocument) -> dict[str, Any]:
@@ -250,7 +261,8 @@ def _crs_text(crs: SceneCrs | None) -> str | None:
 
 
 def _without_triangles(source: SourceDocument, report: Mapping[str, Any]) -> Message:
-    file, found = str(source.paths[0]), [item for item in findings(report) if item.skipped or item.reason.code == "nothing-at-lod"]
+    file, every = str(source.paths[0]), findings(report)
+    found = [item for item in every if item.skipped or item.failed_file or item.reason.code == "nothing-at-lod"]
     if not found:
         return message("no-usable-triangle", file=file)
     said = [item.message for item in found] if len(found) > 1 else [found[0].line]

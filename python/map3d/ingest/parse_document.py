@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,6 +13,8 @@ from map3d.ingest.document_reprojector import DocumentReprojector
 from map3d.ingest.document_sample import DocumentSample, read_sample
 from map3d.ingest.evidence import Evidence
 from map3d.ingest.findings import finding
+from map3d.ingest.model_placement import OPTIONS as PLACEMENT_OPTIONS
+from map3d.ingest.model_placement import ModelPlacement
 from map3d.ingest.texture_places import transform_positions
 from map3d.ingest.upright_check import UprightCheck
 from map3d.subprocess import Handler, ReportProgress
@@ -29,23 +32,29 @@ def open_document_parser(_setup: Mapping[str, Any]) -> Handler:
 
 def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """`request`: {"path", "format", "folder", "reader": options of the core's Reader, "crs": the user's choice or None, "placing": members of
-    `Evidence`, "scene_crs": WKT, "local", or None while the scene has no CRS}. Returns {"report", "crs": the CRS proposed for the scene, None if
-    nothing determines it}."""
+    `Evidence`, "place": what files beside a model say of its place, or None, "scene_crs": WKT, "local", or None while the scene has no CRS}.
+
+    Returns {"report", "crs": the CRS proposed for the scene, None if nothing determines it}."""
     # Where the user states the CRS of all parts, textures are in that one, too.
     transform = None if request["crs"] else transform_positions
-    reader = _core.Reader(request["path"], request["format"], json.dumps(request["reader"]), transform)
-    strict = bool(request["reader"].get("strict"))
+    options = {name: value for name, value in request["reader"].items() if name not in PLACEMENT_OPTIONS}
+    reader = _core.Reader(request["path"], request["format"], json.dumps(options), transform)
+    strict = bool(options.get("strict"))
+    placement, batches, srs_name = ModelPlacement(request), iter(reader), reader.srs_name
+    first = next(batches, None)
+    placed_crs = placement.crs(None if first is None else placement.move(first.positions))
     evidence = Evidence(
         **request["placing"], sample=read_sample(Path(request["path"])) if find_format(request["format"]).has_crs else DocumentSample()
     )
     reprojector = DocumentReprojector(
-        request["format"], reader.srs_name, request["scene_crs"], stated=request["crs"], strict=strict, evidence=evidence
+        request["format"], srs_name or placed_crs, request["scene_crs"], stated=request["crs"], strict=strict, evidence=evidence
     )
     writer = _core.AssetWriter(request["folder"])
     upright, triangles, reported = UprightCheck(), 0, 0
-    for batch in reader:
+    for batch in chain([] if first is None else [first], batches):
         if not batch.prototype:
-            positions = reprojector.to_world(batch.positions, reader.crs_names()[batch.crs], batch.triangle_count)
+            name = reader.crs_names()[batch.crs] or placed_crs
+            positions = reprojector.to_world(placement.move(batch.positions), name, batch.triangle_count)
             if positions is None:
                 continue
             upright.add(positions)
@@ -63,7 +72,7 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
         counts["findings"].append(finding("implicit-geometry-without-place", unplaced))
     hints = upright.hints(request["path"]) if request["reader"].get("up") == "z" else []
     report = reprojector.report(counts)
-    report["findings"] += hints
+    report["findings"] += [*hints, *placement.findings]
     grids = json.loads(reader.grids())
     if grids:
         report["grids"] = [grid | ({} if (axes := reprojector.axes(grid["crs"])) == "auto" else {"axes": axes}) for grid in grids]

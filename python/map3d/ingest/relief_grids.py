@@ -13,9 +13,6 @@ from map3d.ingest.sources import SourceDocument, find_sources
 Grid = Mapping[str, Any]
 """Where a raster is, as its RasterRelief says; see `grids` in map3d._core.Reader."""
 
-AS_TERRAIN = "a grid of heights alone, which is read as terrain"
-"""What a document is that has rasters of reliefs and nothing to draw."""
-
 
 class ReliefGrids:
     """Collects the rasters that imported documents name, and gives them to the terrains that are imported after these."""
@@ -47,7 +44,7 @@ class ReliefGrids:
                 failed.append((str(file), str(error)))
         if missing and terrains:
             first = terrains[0]
-            terrains = [replace(first, paths=(*first.paths, *missing)), *terrains[1:]]
+            terrains = [replace(first, paths=(*first.paths, *missing), places=(*first.places, *missing)), *terrains[1:]]
         elif missing:
             terrains = find_sources(missing, known=names, taken=[name for name, path in names.items() if path.is_file()])
         return [self._with_grids(terrain) for terrain in terrains], failed

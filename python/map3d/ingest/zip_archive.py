@@ -32,9 +32,16 @@ def is_zip(path: Path) -> bool:
         return file.read(4) in (_SIGNATURE, _EMPTY)
 
 
-def unpack(archive: Path, folder: Path, limits: ArchiveLimits, progress: Callable[[int, int], None], name: str | None = None) -> int:
+def unpack(
+    archive: Path,
+    folder: Path,
+    limits: ArchiveLimits,
+    progress: Callable[[int, int], None],
+    name: str | None = None,
+    suffixes: Sequence[str] = (),
+) -> int:
     """Unpacks all files of the archive into the new folder; returns their number. `progress` receives the entries done and all.
-    `name`: what errors call the archive.
+    `name`: what errors call the archive. `suffixes`: unpacks nothing, and returns 0, unless a file has one of these.
 
     Archives in the archive stay packed. Raises ImportFailed for a damaged or encrypted archive and for entries that are links or lead out of the
     folder, LimitExceeded. The folder may then have files of the archive.
@@ -48,7 +55,8 @@ def unpack(archive: Path, folder: Path, limits: ArchiveLimits, progress: Callabl
     process = Subprocess(f"{__name__}:open_unpacker", {}, limits=limited)
     try:
         process.wait_ready(_START_S)
-        request = {"archive": str(archive), "name": name or archive.name, "folder": str(folder), "limits": asdict(limits)}
+        named = {"archive": str(archive), "name": name or archive.name, "folder": str(folder)}
+        request = named | {"limits": asdict(limits), "suffixes": list(suffixes)}
         answer = process.request(request, wall_s=None, on_progress=show)
     except LimitExceeded as error:
         raise LimitExceeded(f"{name or archive.name}: {error}; the archive has too many entries; divide it") from error
@@ -66,20 +74,27 @@ def open_unpacker(_setup: dict[str, Any]) -> Handler:
 
     def handle(request: dict[str, Any], _blobs: list[bytes], report: Callable[[Any], None]) -> tuple[dict[str, Any], Sequence[bytes]]:
         archive, folder, limits = Path(request["archive"]), Path(request["folder"]), ArchiveLimits(**request["limits"])
-        files = unpack_here(archive, folder, limits, lambda *done: report(done), request["name"])
+        files = unpack_here(archive, folder, limits, lambda *done: report(done), request["name"], request["suffixes"])
         return {"files": files}, []
 
     return handle
 
 
 def unpack_here(
-    archive: Path, folder: Path, limits: ArchiveLimits, progress: Callable[[int, int], None] = lambda *_: None, name: str | None = None
+    archive: Path,
+    folder: Path,
+    limits: ArchiveLimits,
+    progress: Callable[[int, int], None] = lambda *_: None,
+    name: str | None = None,
+    suffixes: Sequence[str] = (),
 ) -> int:
     """Unpacks in this process, otherwise like `unpack`."""
     called = name or archive.name
     try:
         with zipfile.ZipFile(archive) as opened:
             entries = list(_checked_entries(called, opened.infolist(), limits))
+            if suffixes and not any(place.suffix.lower() in suffixes for _, place in entries):
+                return 0
             _check_space(called, folder, sum(entry.file_size for entry, _ in entries))
             written = 0
             for number, (entry, place) in enumerate(entries):

@@ -18,6 +18,7 @@ from map3d.lifecycle.remove_files import find_files, is_built, remove_files
 from map3d.lifecycle.remove_scene import find_scene, remove_scene
 from map3d.messages import Message
 from map3d.requests import CreateRendering
+from map3d.requests.reading import ModelOffset
 from map3d.scenes.build import build_if_stale
 from map3d.scenes.outliers import Outliers, choose_content, read_outliers
 from map3d.scenes.style import choose_style
@@ -55,10 +56,13 @@ class LibraryScene:
         height_unit: str = "auto",
         up: str = "z",
         split: str = "file",
+        unit: str = "auto",
+        offset: tuple[float, float, float] | None = None,
         theme: str | None = None,
         lod: str | None = None,
         interiors: bool = False,
         transparency: str = "auto",
+        elevation: Sequence[str] = (),
         max_error_m: float = 0.0,
         strict: bool = False,
         parse_memory_bytes: int | None = None,
@@ -80,10 +84,13 @@ class LibraryScene:
             height_unit=height_unit,
             up=up,
             split=split,
+            unit=unit,
+            offset=None if offset is None else ModelOffset(*offset),
             theme=theme,
             lod=lod,
             interiors=interiors,
             transparency=transparency,
+            elevation=tuple(elevation),
             max_error_m=max_error_m,
             strict=strict,
             parse_memory_bytes=parse_memory_bytes,

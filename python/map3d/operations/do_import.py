@@ -7,6 +7,7 @@ from typing import Final
 from map3d.catalogue import Catalogue, OperationRecord, Workspace
 from map3d.coherence.import_files import FilesImport, import_files
 from map3d.errors import ImportFailed
+from map3d.ingest.file_notes import note_lines
 from map3d.ingest.findings import findings, skipped_count
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported
@@ -54,6 +55,7 @@ def _show_imported(report: OperationReport, file: str, number: int, total: int, 
 
 def _log(report: OperationReport, done: FilesImport) -> None:
     report.log_counted((line for item in done.imported for line in _import_lines(item)), MAX_LINES, "more-lines")
+    report.log_counted(note_lines(done.ignored), MAX_LINES, "more-lines")
     report.log_counted((message("not-imported", reason=reason) for _, reason in done.failed), MAX_LINES, "more-files-not-imported")
 
 

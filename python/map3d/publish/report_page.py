@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from map3d.formats import title_of
+from map3d.ingest.file_notes import tag
 from map3d.ingest.findings import Finding
 from map3d.messages import message
 from map3d.publish.page_head import MAX_TITLE, add_policy, cut
@@ -132,9 +133,9 @@ def _left_out(report: SiteReport) -> str:
 
 
 def _others(report: SiteReport) -> str:
-    """Returns the files that are not in the map."""
-    tagged = (("not imported", "tag bad", report.failed), ("ignored", "tag", report.ignored))
-    rows = [_other_row(tag, style, file, reason) for tag, style, pairs in tagged for file, reason in pairs[:MAX_ROWS]]
+    """Returns the files that are no documents of the map."""
+    rows = [_other_row("not imported", "tag bad", file, reason) for file, reason in report.failed[:MAX_ROWS]]
+    rows += [_other_row(tag(note), "tag", file, str(note)) for file, note in report.ignored[:MAX_ROWS]]
     if not rows:
         return ""
     return f'<section><h2>Files that are not in the map</h2><table class="others"><tbody>{"".join(rows)}</tbody></table></section>'

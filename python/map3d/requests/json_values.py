@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple, TypeVar
 from map3d.errors import BadRequest
 from map3d.geometry.sun import GeographicPosition, SunAngles
 from map3d.requests.param import RequestField, fields_of, help_text
+from map3d.requests.reading import ModelOffset
 from map3d.requests.renderings import Window
 from map3d.requests.scenes import Style
 from map3d.types import ViewAngles
@@ -41,6 +42,7 @@ _KINDS: Final[Mapping[Any, _Kind]] = {
     SunAngles: _Kind(_numbers(2), lambda value: SunAngles(*value)),
     GeographicPosition: _Kind(_numbers(2), lambda value: GeographicPosition(*value)),
     Window: _Kind(_numbers(3), tuple),
+    ModelOffset: _Kind(_numbers(3), lambda value: ModelOffset(*value)),
     tuple[str, ...]: _Kind(_texts({"type": "string"}), tuple),
     tuple[float, ...]: _Kind({"anyOf": [_NUMBER, _texts(_NUMBER)]}, lambda value: tuple(value) if isinstance(value, list) else (float(value),)),
     tuple[ViewAngles, ...]: _Kind(_texts(_numbers(2)), lambda value: tuple(ViewAngles(*view) for view in value)),

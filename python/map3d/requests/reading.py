@@ -1,7 +1,7 @@
 """Requests that read files: add files, inspect."""
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, NamedTuple, get_args
 
 from map3d.requests.param import param
 
@@ -9,6 +9,16 @@ Axes = Literal["auto", "east-north", "north-east"]
 AXES: Final[tuple[Axes, ...]] = get_args(Axes)
 HeightUnit = Literal["auto", "m", "ft", "us-ft"]
 HEIGHT_UNITS: Final[tuple[HeightUnit, ...]] = get_args(HeightUnit)
+UNITS_M: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1000.0, "ft": 0.3048, "us-ft": 1200 / 3937, "in": 0.0254}
+"""Unit of a model → metres."""
+
+
+class ModelOffset(NamedTuple):
+    """What is added to the coordinates of a model, in units of its coordinate system."""
+
+    east: float
+    north: float
+    height: float
 
 
 def crs_param() -> Any:
@@ -37,6 +47,19 @@ class FormatOptions:
     )
     up: str = param("z", help="OBJ: the axis that points up.", label="OBJ: upward axis", choices=("y", "z"))
     split: str = param("file", help="OBJ: the part that becomes one object.", label="OBJ: one object per", choices=("file", "group"))
+    unit: str = param(
+        "auto",
+        help="OBJ: unit of the coordinates; auto: that of the coordinate system, metres without one.",
+        label="OBJ: unit",
+        choices=("auto", *UNITS_M),
+    )
+    offset: ModelOffset | None = param(
+        None,
+        help="OBJ: where the origin of the model lies: east, north and height in the coordinate system of the files.",
+        example="691000,5336000,500",
+        words="as a file beside the model says, else 0,0,0",
+        label="OBJ: place of the origin",
+    )
     theme: str | None = param(
         None, help="CityGML: the appearance theme to use.", words="the one with the most textures", label="CityGML: appearance theme"
     )
@@ -48,6 +71,13 @@ class FormatOptions:
         "invisible.",
         label="Transparency of materials",
         choices=("auto", "as-is", "inverted"),
+    )
+    elevation: tuple[str, ...] = param(
+        (),
+        help="Rasters: names or patterns of those that give heights; the others give colours.",
+        example="dtm_*.tif",
+        words="found out by content and name",
+        label="Rasters that give heights",
     )
     max_error_m: float = param(
         0.0,

@@ -101,10 +101,15 @@ def sum_kinds(files: Sequence[FileContents]) -> list[ObjectKind]:
 def findings_of(files: Sequence[FileContents]) -> list[Finding]:
     """Returns the findings of all files together. The example names its file if there are several."""
     return sum_findings(
-        replace(found, example=f"{file.source}: {found.example}") if len(files) > 1 and found.example else found
+        replace(found, example=_named(found.example, file.source)) if len(files) > 1 and found.example else found
         for file in files
         for found in file.findings
     )
+
+
+def _named(example: str, source: str) -> str:
+    """Returns an example with the name of its file, which it may begin with."""
+    return example if example.startswith(f"{source}: ") else f"{source}: {example}"
 
 
 def _contents(asset: AssetRecord, box: Box | None, kinds: tuple[ObjectKind, ...], outside: int) -> FileContents:
@@ -112,7 +117,7 @@ def _contents(asset: AssetRecord, box: Box | None, kinds: tuple[ObjectKind, ...]
     placing, rasters = report.get("placing", {}), report.get("rasters")
     return FileContents(
         asset=asset.name,
-        source=Path(asset.source).name,
+        source=report.get("first_raster") or Path(asset.source).name,
         format=asset.format,
         rasters=Rasters(rasters["elevation"], rasters["imagery"]) if rasters else None,
         bytes=report.get("bytes", 0),

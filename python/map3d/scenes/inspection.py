@@ -9,6 +9,7 @@ from typing import Final
 from map3d.catalogue import Catalogue, SceneCrs, SceneRecord, Workspace
 from map3d.coherence.import_files import OnFile, import_files
 from map3d.ingest.content import Cluster
+from map3d.ingest.file_notes import FileNote
 from map3d.ingest.import_options import ImportOptions
 from map3d.messages import Message
 from map3d.registry import Registry
@@ -22,15 +23,15 @@ _SCENE: Final = "inspect"
 @dataclass(frozen=True)
 class Inspection:
     """`crs`: that of the scene which an import of the files makes; `box`: of all files, in that CRS. `clusters`: groups of content far from each
-    other, largest first; empty when everything is in one place, without the strays in `left_out`. `failed`: (file, reason); `ignored`: (file, what it
-    is)."""
+    other, largest first; empty when everything is in one place, without the strays in `left_out`. `failed`: (file, reason); `ignored`: files of the
+    folders that are no documents of their own."""
 
     crs: SceneCrs | None
     box: Box | None
     files: tuple[FileContents, ...]
     clusters: tuple[Cluster, ...]
     failed: tuple[tuple[str, Message], ...]
-    ignored: tuple[tuple[str, str], ...]
+    ignored: tuple[FileNote, ...]
     left_out: Outliers
 
 

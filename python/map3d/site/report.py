@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from map3d.catalogue import Workspace
 from map3d.geometry.views import view_id
+from map3d.ingest.file_notes import FileNote
 from map3d.ingest.findings import Finding
 from map3d.messages import load_message
 from map3d.registry import ObjectKind
@@ -21,9 +22,9 @@ VERSION: Final = 2
 
 @dataclass(frozen=True)
 class SiteReport:
-    """`place`: the middle of the scene and the nearest town; `failed`: (file, reason); `ignored`: (file, what it is); `left_out`: lines about
-    content far from the rest. `why`: reason of the resolution, empty when the user chose it; `seconds`: of the last run that rendered something, None
-    before it."""
+    """`place`: the middle of the scene and the nearest town; `failed`: (file, reason); `ignored`: files that are no documents of their own;
+    `left_out`: lines about content far from the rest. `why`: reason of the resolution, empty when the user chose it; `seconds`: of the last run that
+    rendered something, None before it."""
 
     title: str
     crs: str | None
@@ -31,7 +32,7 @@ class SiteReport:
     box: Box | None
     files: tuple[FileContents, ...]
     failed: tuple[tuple[str, str], ...]
-    ignored: tuple[tuple[str, str], ...]
+    ignored: tuple[FileNote, ...]
     left_out: tuple[str, ...]
     views: tuple[str, ...]
     res_m: float
@@ -75,7 +76,10 @@ def _path(workspace: Workspace, rendering: str) -> Path:
 
 
 def _parse(value: Mapping[str, Any]) -> SiteReport:
-    pairs = {name: tuple((file, text) for file, text in value[name]) for name in ("failed", "ignored")}
+    pairs = {
+        "failed": tuple((file, reason) for file, reason in value["failed"]),
+        "ignored": tuple((file, load_message(note)) for file, note in value["ignored"]),
+    }
     lists = {name: tuple(value[name]) for name in ("left_out", "views")}
     return SiteReport(**{**value, **pairs, **lists, "box": _parse_box(value["box"]), "files": tuple(map(_parse_file, value["files"]))})
 

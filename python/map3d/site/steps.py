@@ -100,7 +100,7 @@ def store_report(
         place="" if box is None else str(middle_of(box, scene.crs)),
         box=box,
         files=tuple(replace(file, findings=tuple(_published(finding, file.source, folder) for finding in file.findings)) for file in files),
-        failed=tuple((_without_folder(file, folder), _without_folder(reason, folder)) for file, reason in summary.failed),
+        failed=tuple((_without_folder(file, folder), _without_folder(str(reason), folder)) for file, reason in summary.failed),
         ignored=tuple(summary.ignored),
         left_out=tuple(map(str, outlier_lines(read_outliers(workspace, request.name), scene.crs))),
         views=view_names([frame.angles for frame in record.frames]),

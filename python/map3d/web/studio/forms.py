@@ -72,6 +72,8 @@ def _value(one: RequestField, text: str, schema: Mapping[str, Any]) -> Any:
         if size is None:
             raise BadRequest(f"{one.rest} is {text[:40]!r}, expected a size such as 512M or 2G")
         return size
+    if one.kind == tuple[str, ...]:
+        return [part.strip() for part in text.split(",") if part.strip()]
     if schema["type"] in ("integer", "number"):
         return _number(one, text, whole=schema["type"] == "integer")
     return _numbers(one, text, schema.get("minItems", 0)) if schema["type"] == "array" else text
