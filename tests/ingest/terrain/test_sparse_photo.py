@@ -122,6 +122,6 @@ def test_windows_of_a_large_photo_give_its_range_of_values(tmp_path: Path, layou
     ramp = np.broadcast_to(np.arange(3000, dtype=np.uint16), (3, 1000, 3000)).copy()
     with rasterio.open(write(tmp_path / "ortho.tif", ramp, 0.5, **layout)) as dataset:
         whole = Orthophoto(dataset, (10, 20, 30), 2048).stretch
-        monkeypatch.setattr("map3d.ingest.terrain.orthophoto.WHOLE_SAMPLE_PX", 1)
+        monkeypatch.setattr("map3d.ingest.terrain.photo_values.WHOLE_SAMPLE_PX", 1)
         windows = Orthophoto(dataset, (10, 20, 30), 2048).stretch
     np.testing.assert_allclose(windows, whole, atol=100)

@@ -14,6 +14,7 @@ from rasterio.enums import ColorInterp
 from rasterio.shutil import copy
 
 from map3d.errors import BadRequest, CrsError, ImportFailed, LimitExceeded, NotFound, Stopped
+from map3d.ingest.findings import finding
 from map3d.ingest.terrain import terrain_rasters
 from map3d.ingest.terrain.height_tint import COLOURS
 from map3d.ingest.terrain.terrain_import import import_terrain
@@ -295,7 +296,7 @@ LAYOUTS = {
     "grey": (RGB[:1], {}, np.repeat(RGB[:1], 3, axis=0)),
     "float bytes": (RGB.astype(np.float32), {"nodata": NAN_LAYER}, RGB),
     "float shares": ((RGB / 255).astype(np.float32), {}, RGB),
-    "uint16": (RGB.astype(np.uint16) * 100 + 300, {}, RGB),
+    "uint16": (RGB.astype(np.uint16) * 257, {}, RGB),
 }
 
 
@@ -415,11 +416,14 @@ def test_a_virtual_raster_is_refused(tmp_path, folder):
         run(virtual, None, folder)
 
 
-def test_a_truncated_raster_fails_with_its_name(tmp_path, folder):
+def test_what_can_be_read_of_a_truncated_raster_is_used_and_strict_reading_raises_its_name(tmp_path, folder):
     dem = write(tmp_path / "dem.tif", np.random.default_rng(0).random((1, 300, 300), np.float32))
     os.truncate(dem, dem.stat().st_size // 2)
-    with pytest.raises(ImportFailed, match=r"dem\.tif"):
-        run(dem, None, folder)
+    writer, report = run(dem, None, folder)
+    assert finding("raster-damaged", 1, "dem.tif") in warned(report)
+    assert writer.triangle_count == pytest.approx(2 * 301 * 301 / 2, rel=0.1)
+    with pytest.raises(ImportFailed, match=r"dem\.tif: cannot read .* the file may be damaged"):
+        run(dem, None, folder, strict=True)
 
 
 def test_too_many_triangles_are_refused_with_advice(tmp_path, folder, monkeypatch):

@@ -3,6 +3,7 @@
 import io
 import threading
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Final
@@ -13,7 +14,9 @@ from PIL import Image
 from rasterio.enums import ColorInterp, MaskFlags, Resampling
 from rasterio.windows import Window
 
-from map3d.errors import ImportFailed
+from map3d.ingest.terrain.damaged_reads import Damage, read_checked, read_mask, read_parts
+from map3d.ingest.terrain.photo_margin import PhotoMargin
+from map3d.ingest.terrain.photo_values import ValueRange, find_colour_bands, find_range, is_whole, sample_values, significant_bits
 from map3d.ingest.terrain.stored_blocks import StoredBlocks
 
 MARGIN_PX: Final = 8
@@ -23,16 +26,6 @@ EXTEND_PX: Final = MARGIN_PX + ALIGN_PX
 
 JPEG_QUALITY: Final = 90
 PLAIN_PX: Final = 8
-SAMPLE_PX: Final = 1024
-"""Side of the overview that determines the range of values."""
-
-WHOLE_SAMPLE_PX: Final = 1 << 24
-"""Rasters with more pixels and no overviews are sampled in windows."""
-
-SAMPLE_WINDOWS: Final = 256
-SAMPLE_WINDOW_PX: Final = 64
-"""Side of these windows."""
-
 Colours = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
@@ -61,17 +54,32 @@ class TextureTile:
 
 
 class Orthophoto:
-    """Colours of an open raster. `stretch`: the values mapped to 0 and 255; None derives them from data type and data."""
+    """Colours of an open raster. `value_range`: the values mapped to 0 and 255; None derives them from data type and data."""
 
-    def __init__(self, dataset: Any, ground: tuple[int, int, int], max_side_px: int, stretch: tuple[float, float] | None = None) -> None:
+    def __init__(
+        self,
+        dataset: Any,
+        ground: tuple[int, int, int],
+        max_side_px: int,
+        value_range: ValueRange | None = None,
+        margin: PhotoMargin | None = None,
+        damage: Damage | None = None,
+        name: str = "",
+    ) -> None:
+        """`margin`: the one of the photo that is transparent; `damage` gets the `name` of a photo that cannot be read as a whole."""
         self.dataset = dataset
         self._ground = np.array(ground, dtype=np.uint8)
         self._max_side_px = max_side_px
-        self._bands = _find_colour_bands(dataset)
+        self._margin, self._damage, self._name = margin, damage or Damage(strict=True), name or str(dataset.name)
+        self._bands = find_colour_bands(dataset)
         self._blocks = StoredBlocks(dataset, self._bands)
         self._has_no_gaps = all(flags == [MaskFlags.all_valid] for flags in dataset.mask_flag_enums)
         self._palette = _read_palette(dataset) if len(self._bands) == 1 else None
-        self.stretch = (0.0, 255.0) if self._palette is not None else stretch or self._find_stretch()
+        self.value_range = ValueRange() if self._palette is not None else value_range or self._find_range()
+
+    @property
+    def stretch(self) -> tuple[float, float]:
+        return self.value_range.stretch
 
     def cut(self, box: tuple[float, float, float, float], folder: Path, *, cutout: bool) -> TextureTile | None:
         """Writes the texture of photo positions (left, top, right, bottom) into `folder`; returns None if the photo has no pixel there.
@@ -112,20 +120,27 @@ class Orthophoto:
         return _pad(_fill_gaps(colour, covered, self._ground), covered, rows, columns, (out_height, out_width), self._ground)
 
     def _read_inside(self, window: Window, rows: int, columns: int) -> tuple[Colours, Mask]:
+        colour, covered = np.zeros((rows, columns, 3), dtype=np.uint8), np.zeros((rows, columns), dtype=bool)
         stored = self._blocks.mask(window, rows, columns)
         if stored is not None and not stored.any():
-            return np.zeros((rows, columns, 3), dtype=np.uint8), stored
+            return colour, covered
+        block_rows = max(height for height, _ in self.dataset.block_shapes)
+        read, failed = partial(self._read_rows, columns=columns), partial(self._damage.add, self._name)
+        for part, (part_colour, part_covered) in read_parts(window, rows, block_rows, read, failed):
+            colour[part], covered[part] = part_colour, part_covered
+        if stored is not None:
+            covered &= stored
+        return colour, covered
+
+    def _read_rows(self, window: Window, rows: int, columns: int) -> tuple[Colours, Mask]:
         resampling = Resampling.nearest if self._palette is not None else Resampling.average
-        try:
-            data = self.dataset.read(self._bands, window=window, out_shape=(len(self._bands), rows, columns), resampling=resampling)
-            mask = None if self._has_no_gaps else self.dataset.dataset_mask(window=window, out_shape=(rows, columns), resampling=Resampling.nearest)
-        except Exception as error:
-            raise ImportFailed(f"{self.dataset.name}: cannot read {window}; the file may be damaged: {error}") from error
+        data = read_checked(self.dataset, self._bands, window=window, out_shape=(len(self._bands), rows, columns), resampling=resampling)
+        mask = None if self._has_no_gaps else read_mask(self.dataset, window=window, out_shape=(rows, columns), resampling=Resampling.nearest)
         covered = np.ones((rows, columns), dtype=bool) if mask is None else mask > 0
         if data.dtype.kind == "f":
             covered &= np.isfinite(data).all(axis=0)
-        if stored is not None:
-            covered &= stored
+        if self._margin is not None:
+            covered &= ~self._margin.find(window, data)
         return np.moveaxis(self._to_bytes(data), 0, -1), covered
 
     def _to_bytes(self, data: NDArray[Any]) -> Colours:
@@ -139,53 +154,12 @@ class Orthophoto:
             data = np.clip(np.nan_to_num(scaled, nan=0.0) + 0.5, 0, 255).astype(np.uint8)
         return data if len(data) == 3 else np.repeat(data[:1], 3, axis=0)
 
-    def _find_stretch(self) -> tuple[float, float]:
-        """Returns the full range for bytes, otherwise a range that the values suggest."""
+    def _find_range(self) -> ValueRange:
+        """Returns the full range for bytes, otherwise a range that the file or its values suggest."""
         values = sample_values(self.dataset, 1)
-        return (0.0, 255.0) if values is None else find_stretch(values)
-
-
-def sample_values(dataset: Any, count: int) -> NDArray[np.float64] | None:
-    """Returns values of the colour bands, evenly spread, fewer if this is one of `count` photos; None for bytes."""
-    bands = _find_colour_bands(dataset)
-    if dataset.dtypes[bands[0] - 1] == "uint8":
-        return None
-    side = max(int(SAMPLE_PX / count**0.5), 16)
-    blocks = StoredBlocks(dataset, bands)
-    if dataset.width * dataset.height > WHOLE_SAMPLE_PX and not dataset.overviews(bands[0]):
-        windows = blocks.spread(max(SAMPLE_WINDOWS // count, 1), SAMPLE_WINDOW_PX)
-        return np.concatenate([_known_values(dataset, bands, window, (int(window.height), int(window.width)), blocks) for window in windows])
-    shape = (min(dataset.height, side), min(dataset.width, side))
-    return _known_values(dataset, bands, Window(0, 0, dataset.width, dataset.height), shape, blocks)
-
-
-def _known_values(dataset: Any, bands: list[int], window: Window, shape: tuple[int, int], blocks: StoredBlocks) -> NDArray[np.float64]:
-    """Returns the values of a window, read at `shape`, that are there and finite."""
-    data = dataset.read(bands, window=window, out_shape=(len(bands), *shape), masked=True).astype(np.float64)
-    stored = blocks.mask(window, *shape)
-    known = np.ma.masked_invalid(data if stored is None else np.ma.masked_where(np.broadcast_to(~stored, data.shape), data))
-    values: NDArray[np.float64] = known.compressed()
-    return values
-
-
-def find_stretch(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Returns [0, 1] or [0, 255] for values within; otherwise the 0.5th to the 99.5th percentile."""
-    if not len(values):
-        return 0.0, 255.0
-    if values.min() >= 0 and values.max() <= 255:
-        return (0.0, 1.0) if values.max() <= 1.0 else (0.0, 255.0)
-    low, high = (float(value) for value in np.percentile(values, [0.5, 99.5]))
-    return (low, high) if high > low else (low, low + 1.0)
-
-
-def _find_colour_bands(dataset: Any) -> list[int]:
-    """Returns the numbers of the red, green and blue band, declared or by order; or of the single grey band."""
-    declared = list(dataset.colorinterp)
-    rgb = [declared.index(band) + 1 for band in (ColorInterp.red, ColorInterp.green, ColorInterp.blue) if band in declared]
-    if len(rgb) == 3:
-        return rgb
-    visible = [number for number, band in enumerate(declared, 1) if band is not ColorInterp.alpha]
-    return visible[:3] if len(visible) >= 3 else visible[:1]
+        if values is None:
+            return ValueRange()
+        return find_range(values, bits=significant_bits(self.dataset, self._bands), whole_numbers=is_whole(self.dataset, self._bands))
 
 
 def _read_palette(dataset: Any) -> Colours | None:

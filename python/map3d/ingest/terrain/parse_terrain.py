@@ -9,24 +9,26 @@ from typing import Any, Final
 
 import numpy as np
 from pyproj import CRS
-from rasterio.errors import RasterioError
 
 from map3d.errors import CrsError, ImportFailed
 from map3d.geometry.crs import is_local, parse_crs
 from map3d.ingest.exactness import stretch_findings
 from map3d.ingest.findings import finding
 from map3d.ingest.scene_crs import LOCAL, choose_scene_crs, to_scene_crs
+from map3d.ingest.terrain.damaged_reads import READ_ERRORS
 from map3d.ingest.terrain.placed_rasters import PlacedRasters
+from map3d.ingest.terrain.raster_choice import RasterChoice, choose_rasters
 from map3d.ingest.terrain.raster_georeference import open_raster
 from map3d.ingest.terrain.raster_groups import split_far
 from map3d.ingest.terrain.raster_placement import RasterPlacement
+from map3d.ingest.terrain.raster_roles import find_roles
 from map3d.ingest.terrain.terrain_checkpoints import GDAL_CACHE_MB
-from map3d.ingest.terrain.terrain_import import import_terrain
+from map3d.ingest.terrain.terrain_import import OnTile, import_terrain
 from map3d.ingest.terrain.terrain_options import MAX_WORKERS, TerrainOptions
 from map3d.ingest.virtual_raster import check_virtual_raster
+from map3d.quantities import names_text
 from map3d.subprocess import Handler, ReportProgress
 
-IMAGE_BANDS: Final = (3, 4)
 WORKER_BYTES: Final = 64 << 20
 BYTES_PER_PX: Final = 40
 """Memory for a pixel of a texture while it is cut from a photo of bytes."""
@@ -54,15 +56,20 @@ def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[
 
 
 def _parse_placed(request: Mapping[str, Any], placed: PlacedRasters, report_progress: ReportProgress) -> dict[str, Any]:
-    rasters, faults = open_rasters([Path(path) for path in request["paths"]], request["virtual"], placed, strict=request["reader"]["strict"])
-    dems, orthos = classify_rasters(rasters)
-    target = _choose_target(next(iter(dems or orthos), None), request["crs"], request["scene_crs"])
-    near, far = split_far(rasters, target, request["crs"])
+    strict, stated = request["reader"]["strict"], request["crs"]
+    rasters, faults = open_rasters([Path(path) for path in request["paths"]], request["virtual"], placed, strict=strict)
+    rasters, misplaced = _placeable(rasters, request)
+    roles = find_roles(rasters, request["reader"].get("elevation", ()), frozenset(placed.heights))
+    by_use = sorted(roles, key=lambda role: (role.gives != "heights", role.rank))
+    target = _choose_target(by_use[0].path, stated, request["scene_crs"])
+    bounds, near, far = split_far(rasters, target, stated)
+    roles = [role for role in roles if role.path in near]
     if far and request["scene_crs"] is None:
-        dems, orthos = classify_rasters(near)
-        target = _choose_target(next(iter(dems or orthos), None), request["crs"], None)
-    dems, orthos = ([raster for raster in kind if raster in near] for kind in (dems, orthos))
-    placement = RasterPlacement(request["crs"], request["scene_crs"], request["scene_origin"])
+        target = _choose_target(next(role.path for role in by_use if role.path in near), stated, None)
+        bounds, *_ = split_far(near, target, stated)
+    origin = request["scene_origin"]
+    choice = choose_rasters(roles, bounds, None if origin is None else origin[2])
+    placement = RasterPlacement(stated, request["scene_crs"], origin)
     for raster in near:
         placement.check(raster)
 
@@ -70,10 +77,11 @@ def _parse_placed(request: Mapping[str, Any], placed: PlacedRasters, report_prog
         report_progress({"done": done, "total": total})
         return True
 
-    options = TerrainOptions(name=request["name"], max_error_m=request["reader"].get("max_error_m", 0.0), crs=request["crs"])
-    options = replace(options, workers=worker_count(request["cores"], _free_bytes(), options.texture_px, orthos))
+    max_error_m = request["reader"].get("max_error_m", 0.0)
+    options = TerrainOptions(name=request["name"], max_error_m=max_error_m, crs=stated, ranks=choice.ranks, strict=strict)
+    options = replace(options, workers=worker_count(request["cores"], _free_bytes(), options.texture_px, choice.orthos))
     checkpoints = request["checkpoints"] and Path(request["checkpoints"])
-    terrain = import_terrain(dems, orthos, Path(request["folder"]), target, options, on_tile, checkpoints=checkpoints)
+    terrain = _import(choice, Path(request["folder"]), target, options, on_tile, checkpoints)
     proposed = LOCAL if target is None else to_scene_crs(target)
     placing = {"from": terrain["crs"] and CRS.from_user_input(terrain["crs"]).name, "to": proposed.name, **terrain["projection"]}
     if placement.place is not None:
@@ -81,15 +89,46 @@ def _parse_placed(request: Mapping[str, Any], placed: PlacedRasters, report_prog
         if terrain["crs"] and target is not None:
             at = (placement.place.lon, placement.place.lat)
             terrain["findings"] += stretch_findings(CRS.from_user_input(terrain["crs"]), target, at)
-    terrain["findings"] += [*placement.findings, *placed.findings]
+    terrain["findings"] += [*placement.findings, *placed.findings, *choice.findings]
     if far:
         path, away_m = far[0]
         example = f"{path.name} lies {away_m / 1000:,.0f} km from the other rasters; its CRS may be wrong, else import it alone"
         terrain["findings"].append(finding("raster-far-from-others", len(far), example))
-    if faults:
-        terrain["findings"].append(finding("raster-unreadable", len(faults), faults[0]))
-    counts = {"elevation": len(dems), "imagery": len(orthos)}
-    return {"report": {**terrain, "rasters": counts, "placing": placing}, "crs": asdict(proposed)}
+    for code, reasons in (("raster-unreadable", faults), ("raster-misplaced", misplaced)):
+        if reasons:
+            terrain["findings"].append(finding(code, len(reasons), reasons[0]))
+    counts = {"elevation": len(choice.dems), "imagery": len(choice.orthos)}
+    first = next(iter([*choice.dems, *choice.orthos])).name
+    return {"report": {**terrain, "rasters": counts, "first_raster": first, "placing": placing}, "crs": asdict(proposed)}
+
+
+def _placeable(rasters: Sequence[Path], request: Mapping[str, Any]) -> tuple[list[Path], list[str]]:
+    """Returns the rasters that can lie where they would be put, and why the others cannot. Raises CrsError if there is none, or at the first under
+    `strict`."""
+    good, errors = list[Path](), list[CrsError]()
+    for raster in rasters:
+        try:
+            RasterPlacement(request["crs"], request["scene_crs"], request["scene_origin"]).check(raster)
+            good.append(raster)
+        except CrsError as error:
+            errors.append(error)
+    if errors and (request["reader"]["strict"] or not good):
+        raise errors[0]
+    return good, [str(error) for error in errors]
+
+
+def _import(
+    choice: RasterChoice, folder: Path, target: CRS | None, options: TerrainOptions, on_tile: OnTile, checkpoints: Path | None
+) -> dict[str, Any]:
+    """Imports the rasters; without the elevation models, if these have no height at all and there are photos."""
+    terrain = import_terrain(choice.dems, choice.orthos, folder, target, options, on_tile, checkpoints=checkpoints)
+    if terrain["triangles"] or not choice.dems or not choice.orthos:
+        return terrain
+    empty, choice.dems = choice.dems, []
+    flat = import_terrain([], choice.orthos, folder, target, options, on_tile, checkpoints=checkpoints and checkpoints / "flat")
+    flat["findings"] += [finding("elevation-without-heights", len(empty), names_text([path.name for path in empty]))]
+    flat["findings"] += [item for item in terrain["findings"] if item["code"] == "raster-damaged"]
+    return flat
 
 
 def open_rasters(paths: Sequence[Path], virtual: Mapping[str, str], placed: PlacedRasters, *, strict: bool) -> tuple[list[Path], list[str]]:
@@ -109,20 +148,11 @@ def open_rasters(paths: Sequence[Path], virtual: Mapping[str, str], placed: Plac
             readable.append(place)
         except ImportFailed as error:
             faults.append(error)
-        except (RasterioError, OSError) as error:
+        except READ_ERRORS as error:
             faults.append(ImportFailed(f"{path}: not a valid raster: {error}"))
     if faults and (strict or not readable):
         raise faults[0]
     return readable, [str(error) for error in faults]
-
-
-def classify_rasters(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
-    """Returns the elevation models and the imagery. Imagery has three or four bands, or bytes."""
-    found: tuple[list[Path], list[Path]] = ([], [])
-    for path in paths:
-        with open_raster(path) as raster:
-            found[raster.count in IMAGE_BANDS or raster.dtypes[0] == "uint8"].append(path)
-    return found
 
 
 def worker_count(cores: int, free_bytes: float, texture_px: int, orthos: Sequence[Path]) -> int:

@@ -43,6 +43,8 @@ class PlacedRasters:
         """`folder`: a new one for virtual rasters; `grids`: path of a raster → the grid of its relief; `stated_crs`: the user's choice."""
         self._folder, self._grids, self._stated = folder, grids, stated_crs
         self.findings: list[dict[str, Any]] = []
+        self.heights: set[Path] = set()
+        """Paths at which the rasters of reliefs are read."""
 
     def __enter__(self) -> "PlacedRasters":
         return self
@@ -55,6 +57,11 @@ class PlacedRasters:
         grid = self._grids.get(str(path))
         if grid is None:
             return path
+        found = self._place(path, grid)
+        self.heights.add(found)
+        return found
+
+    def _place(self, path: Path, grid: Mapping[str, Any]) -> Path:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NotGeoreferencedWarning)
             with rasterio.open(path, driver=find_driver(path)) as raster:

@@ -18,15 +18,16 @@ SIZES: Final = 3.0
 """Rasters belong together up to a gap of this many diagonals of the larger one, and at least NEAR_M."""
 
 
-def split_far(paths: Sequence[Path], target: CRS | None, stated_crs: str | None) -> tuple[list[Path], list[tuple[Path, float]]]:
-    """Returns the rasters that lie together, and the others with their distances in metres, if more than half of them lie together; else all of
-    them. `target`: the scene's CRS, None for local metres. Raises CrsError."""
-    bounds = [_bounds(path, target, stated_crs) for path in paths]
+def split_far(paths: Sequence[Path], target: CRS | None, stated_crs: str | None) -> tuple[dict[Path, Bounds], list[Path], list[tuple[Path, float]]]:
+    """Returns the bounds of the rasters, those that lie together, and the others with their distances in metres, if more than half of them lie
+    together; else all of them. `target`: the scene's CRS, None for local metres. Raises CrsError."""
+    by_path = {path: _bounds(path, target, stated_crs) for path in paths}
+    bounds = list(by_path.values())
     largest = max(_groups(bounds), key=len, default=[])
     if 2 * len(largest) <= len(paths):
-        return list(paths), []
+        return by_path, list(paths), []
     far = [(path, min(_gap(bounds[k], bounds[other]) for other in largest)) for k, path in enumerate(paths) if k not in largest]
-    return [paths[k] for k in largest], far
+    return by_path, [paths[k] for k in largest], far
 
 
 def _bounds(path: Path, target: CRS | None, stated_crs: str | None) -> Bounds:

@@ -1,11 +1,12 @@
 """Several rasters of one kind as one: a grid of pixels over all of them, whose windows are read from the rasters that cover them.
 
 The grid continues the pixels of the finest raster. Rasters on it are read as they are; others, of another resolution, CRS or offset, are resampled.
+Of rasters at one place, the one of the better kind is on top, then the finer, the newer, and the first by name.
 """
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass
@@ -23,7 +24,11 @@ from rasterio.windows import Window
 
 from map3d.errors import ImportFailed, LimitExceeded
 from map3d.geometry.crs import horizontal_crs
-from map3d.ingest.terrain.orthophoto import Colours, Mask, Orthophoto, find_stretch, sample_values
+from map3d.ingest.terrain.damaged_reads import Damage
+from map3d.ingest.terrain.orthophoto import Colours, Mask, Orthophoto
+from map3d.ingest.terrain.photo_margin import PhotoMargins
+from map3d.ingest.terrain.photo_values import ValueRange, find_colour_bands, find_range, is_whole, sample_values, significant_bits
+from map3d.ingest.terrain.raster_dates import date_in_name, date_in_tags
 from map3d.ingest.terrain.raster_georeference import Array, PlaneTransformer, RasterGeoreference, open_raster, own_crs, place_of
 from map3d.ingest.terrain.vertex_grid import RasterHeightField, read_metres
 
@@ -41,7 +46,8 @@ _PLANE: Final = CRS.from_epsg(3857)
 
 @dataclass(frozen=True)
 class MosaicPart:
-    """A raster and the rectangle that it covers, in pixels of the mosaic. `on_grid`: its pixels are the mosaic's."""
+    """A raster and the rectangle that it covers, in pixels of the mosaic. `on_grid`: its pixels are the mosaic's. `rank`: parts of a lower one are on
+    top; `date`: when it was taken, empty if unknown."""
 
     path: Path
     left: int
@@ -50,6 +56,16 @@ class MosaicPart:
     height: int
     pixel: float
     on_grid: bool
+    rank: int = 0
+    date: str = ""
+
+    def reason_above(self, other: "MosaicPart") -> str:
+        """Returns why this part lies above another one."""
+        if self.rank != other.rank:
+            return "better by its kind"
+        if self.pixel != other.pixel:
+            return "finer"
+        return "newer" if self.date != other.date else "first by name"
 
 
 @dataclass(frozen=True)
@@ -66,14 +82,15 @@ class PartWindow:
 class RasterMosaic:
     """Has the attributes of a rasterio dataset that the terrain import needs: name, crs, transform, width, height. Context manager."""
 
-    def __init__(self, paths: Sequence[Path], stated_crs: str | None, min_pixel: float = 0.0) -> None:
-        """`stated_crs`: the user's choice for all rasters; `min_pixel`: the least size of a pixel, in units of the CRS.
+    def __init__(self, paths: Sequence[Path], stated_crs: str | None, min_pixel: float = 0.0, ranks: Mapping[Path, int] | None = None) -> None:
+        """`stated_crs`: the user's choice for all rasters; `min_pixel`: the least size of a pixel, in units of the CRS; `ranks`: of kinds of rasters.
 
         Raises ImportFailed, CrsError, LimitExceeded.
         """
-        self._stated = stated_crs
+        self._stated, self._ranks = stated_crs, ranks or {}
         self._opened: OrderedDict[Path, tuple[Any, Any]] = OrderedDict()
         self.crs = next((crs for crs in map(self._own_crs, paths) if crs is not None), None)
+        self._dates = _dates(paths)
         grids = [self._grid_of(path) for path in paths]
         finest = min(grids, key=lambda grid: grid[0].a)[0]
         self.pixel = max(finest.a, min_pixel)
@@ -84,8 +101,9 @@ class RasterMosaic:
         north = finest.f + math.ceil((north - finest.f) / self.pixel - _ALIGNED_PX) * self.pixel
         self.transform = Affine(self.pixel, 0.0, west, 0.0, -self.pixel, north)
         parts = [self._place(path, grid) for path, grid in zip(paths, grids, strict=True)]
-        self.parts = sorted(sorted(parts, key=lambda part: str(part.path), reverse=True), key=lambda part: -part.pixel)
-        """Coarse rasters first, so that finer ones replace their pixels; of equal ones the first by name is on top."""
+        by_name = sorted(parts, key=lambda part: str(part.path), reverse=True)
+        self.parts = sorted(by_name, key=lambda part: (-part.rank, -part.pixel, part.date))
+        """The lowest first, so that those above replace its pixels."""
         self.width, self.height = max(part.left + part.width for part in parts), max(part.top + part.height for part in parts)
         self.name = str(paths[0])
         if max(self.width, self.height) > MAX_SIDE_PX:
@@ -168,11 +186,12 @@ class RasterMosaic:
         left, top = (transform.c - self.transform.c) / self.pixel, (self.transform.f - transform.f) / self.pixel
         scale = transform.a / self.pixel
         same_size = abs(scale - 1.0) * max(width, height) < _ALIGNED_PX
+        kind = self._ranks.get(path, 0), self._dates[path]
         if own_grid and same_size and all(abs(offset - round(offset)) < _ALIGNED_PX for offset in (left, top)):
-            return MosaicPart(path, round(left), round(top), width, height, transform.a, True)
+            return MosaicPart(path, round(left), round(top), width, height, transform.a, True, *kind)
         x0, y0 = math.floor(left + _ALIGNED_PX), math.floor(top + _ALIGNED_PX)
         x1, y1 = math.ceil(left + width * scale - _ALIGNED_PX), math.ceil(top + height * -transform.e / self.pixel - _ALIGNED_PX)
-        return MosaicPart(path, x0, y0, max(x1 - x0, 1), max(y1 - y0, 1), transform.a, False)
+        return MosaicPart(path, x0, y0, max(x1 - x0, 1), max(y1 - y0, 1), transform.a, False, *kind)
 
     def _resampled(self, source: Any, part: MosaicPart) -> WarpedVRT:
         own, target = self._own_crs(part.path) or self.crs, self.crs
@@ -193,9 +212,9 @@ class RasterMosaic:
 class MosaicHeightField(RasterHeightField):
     """Heights of a mosaic of elevation models, each in its own unit."""
 
-    def __init__(self, mosaic: RasterMosaic, metres_per_unit: Callable[[Any], float]) -> None:
+    def __init__(self, mosaic: RasterMosaic, metres_per_unit: Callable[[Any], float], damage: Damage | None = None) -> None:
         """`metres_per_unit`: of a dataset."""
-        super().__init__(mosaic, 1.0, scale=(1.0, 0.0))
+        super().__init__(mosaic, 1.0, scale=(1.0, 0.0), damage=damage)
         self._mosaic = mosaic
         self._scales: dict[Path, tuple[float, float]] = {}
         self._metres_per_unit = metres_per_unit
@@ -203,7 +222,7 @@ class MosaicHeightField(RasterHeightField):
     def _read_window(self, window: Window) -> NDArray[np.float64]:
         data = np.full((window.height, window.width), np.nan)
         for piece in self._mosaic.windows(window):
-            heights, implausible = read_metres(piece.dataset, piece.window, self._scale_of(piece.part))
+            heights, implausible = read_metres(piece.dataset, piece.window, self._scale_of(piece.part), self._damage, str(piece.part.path))
             self.implausible += implausible
             known = np.isfinite(heights)
             data[piece.rows, piece.columns][known] = heights[known]
@@ -220,19 +239,33 @@ class MosaicHeightField(RasterHeightField):
 class MosaicPhoto(Orthophoto):
     """Colours of a mosaic of photos. Photos that are not of bytes share one range of values."""
 
-    def __init__(self, mosaic: RasterMosaic, ground: tuple[int, int, int], max_side_px: int, stretch: tuple[float, float] | None = None) -> None:
+    def __init__(
+        self,
+        mosaic: RasterMosaic,
+        ground: tuple[int, int, int],
+        max_side_px: int,
+        value_range: ValueRange | None = None,
+        margins: PhotoMargins | None = None,
+        damage: Damage | None = None,
+    ) -> None:
         self.dataset = mosaic
         self._ground = np.array(ground, dtype=np.uint8)
         self._max_side_px = max_side_px
-        self._mosaic = mosaic
+        self._mosaic, self._margins, self._damage = mosaic, margins, damage or Damage(strict=True)
         self._photos: dict[Path, tuple[Any, Orthophoto]] = {}
-        self.stretch = stretch or self._find_common_stretch()
+        self.value_range = value_range or self._find_common_range()
 
-    def _find_common_stretch(self) -> tuple[float, float]:
+    def _find_common_range(self) -> ValueRange:
         every = -(-len(self._mosaic.parts) // MAX_SAMPLES)
-        samples = [sample_values(self._mosaic.source(part), len(self._mosaic.parts)) for part in self._mosaic.parts[::every]]
-        known = [values for values in samples if values is not None]
-        return find_stretch(np.concatenate(known)) if known else (0.0, 255.0)
+        samples, bits, whole_numbers = [], 0, True
+        for part in self._mosaic.parts[::every]:
+            source = self._mosaic.source(part)
+            values = sample_values(source, len(self._mosaic.parts))
+            if values is not None:
+                bands = find_colour_bands(source)
+                samples.append(values)
+                bits, whole_numbers = max(bits, significant_bits(source, bands)), whole_numbers and is_whole(source, bands)
+        return find_range(np.concatenate(samples), bits=bits, whole_numbers=whole_numbers) if samples else ValueRange()
 
     def _read_inside(self, window: Window, rows: int, columns: int) -> tuple[Colours, Mask]:
         colour, covered = np.zeros((rows, columns, 3), dtype=np.uint8), np.zeros((rows, columns), dtype=bool)
@@ -249,9 +282,24 @@ class MosaicPhoto(Orthophoto):
         if known is None or known[0] is not piece.dataset:
             is_bytes = self._mosaic.source(piece.part).dtypes[0] == "uint8"
             ground = (int(self._ground[0]), int(self._ground[1]), int(self._ground[2]))
-            known = (piece.dataset, Orthophoto(piece.dataset, ground, self._max_side_px, None if is_bytes else self.stretch))
+            value_range = None if is_bytes else self.value_range
+            margin = None if self._margins is None else self._margins.of(piece.part.path, piece.dataset, self._mosaic.source(piece.part))
+            photo = Orthophoto(piece.dataset, ground, self._max_side_px, value_range, margin, self._damage, str(piece.part.path))
+            known = (piece.dataset, photo)
             self._photos[piece.part.path] = known
         return known[1]
+
+
+def _dates(paths: Sequence[Path]) -> dict[Path, str]:
+    """Returns the dates in the names of rasters or, if no name has one, in their metadata."""
+    named = {path: date_in_name(path) for path in paths}
+    if any(named.values()):
+        return named
+    dates = {}
+    for path in paths:
+        with open_raster(path) as raster:
+            dates[path] = date_in_tags(raster)
+    return dates
 
 
 def _scaled(span: slice, scale: float, count: int) -> tuple[int, int]:

@@ -36,7 +36,9 @@ class RasterPlacement:
             own = own_crs(raster, self._stated)
             bounds, pixel = raster.bounds, max(map(abs, raster.res))
         if own is not None and not own.is_geographic and self._scene_is_local:
-            self._check_distance(path, bounds, f"its CRS is {own.name}, but the scene is in local metres, where")
+            words = f"its CRS is {own.name}, but the scene is in local metres, where"
+            advice = f"; if models have an origin of their own, say where it lies with --crs {_code(own)} --offset X,Y,Z"
+            self._check_distance(path, bounds, words, advice)
             self._warn(
                 "raster-crs-not-used",
                 f"{path.name}; import the other files with --crs to give the scene a CRS, e.g. --crs {_code(own)}",
@@ -74,12 +76,12 @@ class RasterPlacement:
         for found in check.findings:
             self.findings.append({**found, "code": "raster-outside-area-of-use", "example": f"{path.name}: {found['example']}"})
 
-    def _check_distance(self, path: Path, bounds: Any, words: str) -> None:
+    def _check_distance(self, path: Path, bounds: Any, words: str, advice: str = "") -> None:
         away = self._distance_m(bounds)
         if away:
             raise CrsError(
                 f"{path}: {words} the raster lies {away / 1000:,.0f} km from the scene's content; "
-                "name the CRS of the raster or of the other files with --crs, or leave the raster out"
+                f"name the CRS of the raster or of the other files with --crs, or leave the raster out{advice}"
             )
 
     def _distance_m(self, bounds: Any) -> float:

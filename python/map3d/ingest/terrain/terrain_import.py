@@ -26,6 +26,7 @@ from map3d.ingest.terrain.terrain_checkpoints import GDAL_CACHE_MB, TerrainCheck
 from map3d.ingest.terrain.terrain_options import TerrainOptions
 from map3d.ingest.terrain.terrain_rasters import REDUCE_RASTER, TerrainRasters
 from map3d.ingest.terrain.terrain_tiles import TerrainTile, TileBuilder, TileCounts
+from map3d.quantities import names_text
 
 OnTile = Callable[[str, int, int], bool]
 """(stage, done, total) → False to stop."""
@@ -184,6 +185,8 @@ def _report(rasters: TerrainRasters, counts: dict[str, Any], content: _TerrainCo
     found, name = content.counts, Path(rasters.base.name).name
     by_code = {"grid-points-without-height": found.gaps, "heights-implausible": found.implausible, "tiles-outside-photo": found.untextured}
     counted = [finding(code, count, name) for code, count in by_code.items() if count]
+    if found.damaged:
+        counted.append(finding("raster-damaged", len(found.damaged), names_text([Path(path).name for path in found.damaged])))
     return {
         **counts,
         "format": CLASS,

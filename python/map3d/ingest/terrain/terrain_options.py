@@ -1,6 +1,8 @@
 """Options of a terrain import."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -13,9 +15,10 @@ MAX_WORKERS: Final = 256
 @dataclass(frozen=True)
 class TerrainOptions:
     """`max_error_m`: greatest height error of the triangles, 0 keeps every height. `height_m`: height of flat terrain without an elevation model.
-    `height_unit_m`: metres per unit of the elevation model; None takes the unit from the file, else metres. `stretch`: photo values for black and
-    white; None derives them from the data. `ground`: sRGB colour in gaps of the photo. `crs`: overrides the CRS of both rasters, or supplies a
-    missing one; "local" for plain metres. `workers`: threads; the asset does not depend on their number."""
+    `height_unit_m`: metres per unit of the elevation model; None takes the unit from the file, else metres. `ground`: sRGB colour in gaps of the
+    photo. `crs`: overrides the CRS of both rasters, or supplies a missing one; "local" for plain metres. `workers`: threads; the asset does not
+    depend on their number. `ranks`: of kinds of rasters; of several at one place, one of the lowest is on top. `strict`: the first raster that
+    cannot be read as a whole raises ImportFailed."""
 
     name: str = "terrain"
     max_error_m: float = 0.0
@@ -24,9 +27,10 @@ class TerrainOptions:
     height_m: float = 0.0
     height_unit_m: float | None = None
     ground: tuple[int, int, int] = (146, 146, 136)
-    stretch: tuple[float, float] | None = None
     crs: str | None = None
     workers: int = 1
+    ranks: Mapping[Path, int] = field(default_factory=dict)
+    strict: bool = False
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.max_error_m) and self.max_error_m >= 0):

@@ -13,7 +13,11 @@ from map3d.errors import LimitExceeded
 from map3d.geometry.crs import horizontal_crs, vertical_unit_m
 from map3d.ingest.exactness import transformation_findings
 from map3d.ingest.findings import finding
+from map3d.ingest.terrain.damaged_reads import Damage
 from map3d.ingest.terrain.orthophoto import ALIGN_PX, MARGIN_PX, Orthophoto
+from map3d.ingest.terrain.photo_margin import PhotoMargin, PhotoMargins
+from map3d.ingest.terrain.photo_values import ValueRange
+from map3d.ingest.terrain.raster_choice import UNDER, covered_share
 from map3d.ingest.terrain.raster_georeference import PlaneTransformer, RasterGeoreference, open_raster, own_crs, place_of, raster_crs
 from map3d.ingest.terrain.raster_mosaic import MosaicHeightField, MosaicPhoto, RasterMosaic
 from map3d.ingest.terrain.terrain_options import TerrainOptions
@@ -44,7 +48,8 @@ class TerrainRasters:
         self._opened = ExitStack()
         try:
             dem = _open(dems, options, MAX_TRIANGLES / 2 if options.max_error_m == 0 else None) if dems else None
-            self._open_all(dem, _open(orthos, options) if orthos else None, scene_crs, options, options.stretch)
+            self._margins = PhotoMargins()
+            self._open_all(dem, _open(orthos, options) if orthos else None, scene_crs, options, None)
         except BaseException:
             self._opened.close()
             raise
@@ -52,17 +57,18 @@ class TerrainRasters:
     def reopen(self) -> Self:
         """Returns the same rasters for another thread."""
         other = object.__new__(type(self))
-        other._opened = ExitStack()
-        stretch = None if self.photo is None else self.photo.stretch
+        other._opened, other._margins = ExitStack(), self._margins
+        value_range = None if self.photo is None else self.photo.value_range
         dem, ortho = (None if raster is None else _reopen(raster) for raster in (self.dem, self.ortho))
-        other._open_all(dem, ortho, self._scene_crs, self._options, stretch)
+        other._open_all(dem, ortho, self._scene_crs, self._options, value_range)
         return other
 
-    def _open_all(self, dem: Any, ortho: Any, scene_crs: CRS | None, options: TerrainOptions, stretch: tuple[float, float] | None) -> None:
+    def _open_all(self, dem: Any, ortho: Any, scene_crs: CRS | None, options: TerrainOptions, value_range: ValueRange | None) -> None:
         for raster in (dem, ortho):
             if raster is not None:
                 self._opened.enter_context(raster)
         self.dem, self.ortho, self._scene_crs, self._options = dem, ortho, scene_crs, options
+        self.damage = Damage(strict=options.strict)
         self.base = ortho if dem is None else dem
         self.flat = dem is None
         crs = raster_crs(self.base, scene_crs, options.crs)
@@ -71,12 +77,17 @@ class TerrainRasters:
         self.scene_from_base = PlaneTransformer(crs, scene_crs, place)
         self.photo: Orthophoto | None = None
         if ortho is not None:
-            photo_type = MosaicPhoto if isinstance(ortho, RasterMosaic) else Orthophoto
-            self.photo = photo_type(ortho, options.ground, options.texture_px, stretch)
+            self.photo = self._open_photo(ortho, value_range)
             photo_crs = raster_crs(ortho, scene_crs, options.crs)
             self.photo_georeference = RasterGeoreference(ortho, photo_crs)
             self.photo_from_base = PlaneTransformer(crs, photo_crs, place)
         self.height_field = self._open_heights(dem)
+
+    def _open_photo(self, ortho: Any, value_range: ValueRange | None) -> Orthophoto:
+        ground, side = self._options.ground, self._options.texture_px
+        if isinstance(ortho, RasterMosaic):
+            return MosaicPhoto(ortho, ground, side, value_range, self._margins, self.damage)
+        return Orthophoto(ortho, ground, side, value_range, self._margins.of(Path(ortho.name), ortho, ortho), self.damage)
 
     def __enter__(self) -> Self:
         return self
@@ -118,6 +129,7 @@ class TerrainRasters:
     def findings(self) -> list[dict[str, Any]]:
         """Returns what is odd about the rasters, before any tile is built."""
         found = [item for raster in (self.dem, self.ortho) for item in _mosaic_findings(raster)]
+        found += self._photo_findings()
         unknown = [unit for unit in map(self._unknown_unit, _datasets(self.dem)) if unit]
         if unknown:
             found.append(finding("height-unit-unknown", len(unknown), unknown[0]))
@@ -135,6 +147,26 @@ class TerrainRasters:
                 names = {"from": str(self.georeference.crs.name), "to": str(horizontal_crs(target).name)}
                 found += transformation_findings(plane.transformation, names)
         return found
+
+    def _photo_findings(self) -> list[dict[str, Any]]:
+        """Says which photos have other values than bytes, and which have a margin that is transparent."""
+        if self.photo is None:
+            return []
+        found = []
+        scaled = [Path(raster.name).name for raster in _datasets(self.ortho) if raster.dtypes[0] != "uint8"]
+        if scaled and self.photo.value_range.words:
+            found.append(finding("photo-values-scaled", len(scaled), f"{scaled[0]}: {self.photo.value_range}"))
+        margins = [(Path(name).name, margin.name) for name, margin in self._photo_margins() if margin is not None]
+        if margins:
+            found.append(finding("photo-margin-transparent", len(margins), f"{margins[0][0]}: {margins[0][1]}"))
+        return found
+
+    def _photo_margins(self) -> Iterator[tuple[str, PhotoMargin | None]]:
+        if isinstance(self.ortho, RasterMosaic):
+            for part in self.ortho.parts:
+                yield str(part.path), self._margins.of(part.path, self.ortho.open(part), self.ortho.source(part))
+        else:
+            yield str(self.ortho.name), self._margins.of(Path(self.ortho.name), self.ortho, self.ortho)
 
     def _checked(self, grid: VertexGrid, parts: int) -> VertexGrid:
         name = self.base.name
@@ -169,8 +201,8 @@ class TerrainRasters:
         if dem is None:
             return ConstantHeightField(self._options.height_m)
         if isinstance(dem, RasterMosaic):
-            return MosaicHeightField(dem, self._height_unit_m)
-        return RasterHeightField(dem, self._height_unit_m(dem))
+            return MosaicHeightField(dem, self._height_unit_m, self.damage)
+        return RasterHeightField(dem, self._height_unit_m(dem), damage=self.damage)
 
     def _height_unit_m(self, dem: Any) -> float:
         if self._options.height_unit_m is not None:
@@ -190,11 +222,11 @@ def _open(paths: Sequence[Path], options: TerrainOptions, max_pixels: float | No
     """Opens a raster, or a mosaic of several with at most `max_pixels`: if the finest pixels are too many, those of the next raster count."""
     if len(paths) == 1:
         return open_raster(paths[0])
-    mosaic = RasterMosaic(paths, options.crs)
+    mosaic = RasterMosaic(paths, options.crs, ranks=options.ranks)
     for pixel in mosaic.pixels[1:]:
         if max_pixels is None or mosaic.covered_pixels <= max_pixels:
             break
-        mosaic = RasterMosaic(paths, options.crs, pixel)
+        mosaic = RasterMosaic(paths, options.crs, pixel, options.ranks)
     return mosaic
 
 
@@ -214,9 +246,19 @@ def _unit(dem: Any) -> str:
 
 
 def _mosaic_findings(raster: Any) -> list[dict[str, Any]]:
-    """Says at which resolution rasters of different ones are read."""
-    if not isinstance(raster, RasterMosaic) or len(raster.pixels) == 1:
+    """Says at which resolution rasters of different ones are read, and which lie under others."""
+    if not isinstance(raster, RasterMosaic):
         return []
-    pixels = ", ".join(f"{pixel:.6g}" for pixel in raster.pixels)
-    example = f"{Path(raster.name).name}: pixels of {pixels}; all are read with pixels of {raster.pixel:.6g}"
-    return [finding("raster-resolutions-differ", 1, example)]
+    found = []
+    if len(raster.pixels) > 1:
+        pixels = ", ".join(f"{pixel:.6g}" for pixel in raster.pixels)
+        example = f"{Path(raster.name).name}: pixels of {pixels}; all are read with pixels of {raster.pixel:.6g}"
+        found.append(finding("raster-resolutions-differ", 1, example))
+    boxes = np.array([(part.left, part.top, part.left + part.width, part.top + part.height) for part in raster.parts], dtype=np.float64)
+    under = [k for k, box in enumerate(boxes) if covered_share(tuple(box), boxes[k + 1 :]) >= UNDER]
+    if under:
+        below = raster.parts[under[0]]
+        above = next(part for k, part in reversed(list(enumerate(raster.parts))) if covered_share(tuple(boxes[under[0]]), boxes[k : k + 1]) > 0)
+        example = f"{below.path.name} under {above.path.name}, which is {above.reason_above(below)}"
+        found.append(finding("raster-under-others", len(under), example))
+    return found

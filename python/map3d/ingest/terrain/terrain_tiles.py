@@ -1,6 +1,6 @@
 """Builds the tiles of a terrain: the triangles of a part of the vertex grid, and their texture."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +29,19 @@ class TerrainTile:
 
 @dataclass
 class TileCounts:
-    """`gaps`: grid points without a height; `implausible`: heights beyond the plausible; `untextured`: tiles outside the photo."""
+    """`gaps`: grid points without a height; `implausible`: heights beyond the plausible; `untextured`: tiles outside the photo; `damaged`: paths of
+    the rasters that cannot be read as a whole, sorted."""
 
     gaps: int = 0
     implausible: int = 0
     untextured: int = 0
+    damaged: list[str] = field(default_factory=list)
 
     def add(self, other: "TileCounts") -> None:
         self.gaps += other.gaps
         self.implausible += other.implausible
         self.untextured += other.untextured
+        self.damaged = sorted({*self.damaged, *other.damaged})
 
 
 class TileBuilder:
@@ -53,6 +56,13 @@ class TileBuilder:
 
     def build(self, tile: GridTile, textures: Path, counts: TileCounts) -> TerrainTile | None:
         """Writes the texture into `textures` and adds to `counts`; returns None for a tile without triangles. Raises ImportFailed."""
+        self._rasters.damage.names.clear()
+        try:
+            return self._build(tile, textures, counts)
+        finally:
+            counts.damaged = sorted({*counts.damaged, *self._rasters.damage.names})
+
+    def _build(self, tile: GridTile, textures: Path, counts: TileCounts) -> TerrainTile | None:
         rasters = self._rasters
         rows, columns = self._grid.positions(tile)
         row_of, column_of = (grid.ravel() for grid in np.meshgrid(rows, columns, indexing="ij"))

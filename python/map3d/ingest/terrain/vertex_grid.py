@@ -6,13 +6,14 @@ edge, so that the terrain covers the whole raster. Each vertex is computed from 
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from rasterio.windows import Window
 
-from map3d.errors import ImportFailed
+from map3d.ingest.terrain.damaged_reads import Damage, read_checked, read_parts
 
 MAX_HEIGHT_M = 100_000.0
 """Greater absolute heights count as unmarked gaps."""
@@ -91,9 +92,10 @@ class ConstantHeightField:
 class RasterHeightField:
     """Heights of a raster's first band: bilinear between pixel centres, constant from the outermost centres to the edge. Reads windows only."""
 
-    def __init__(self, dataset: Any, metres_per_unit: float, scale: tuple[float, float] | None = None) -> None:
-        """`scale`: metres per value and metres of the value 0; None takes them from the dataset."""
-        self._dataset = dataset
+    def __init__(self, dataset: Any, metres_per_unit: float, scale: tuple[float, float] | None = None, damage: Damage | None = None) -> None:
+        """`scale`: metres per value and metres of the value 0; None takes them from the dataset. `damage` gets the name of a raster that cannot
+        be read as a whole."""
+        self._dataset, self._damage = dataset, damage or Damage(strict=True)
         self._scale = scale or (float(dataset.scales[0]) * metres_per_unit, float(dataset.offsets[0]) * metres_per_unit)
         self.implausible = 0
         """Number of heights beyond ±100 km, counted once per tile."""
@@ -115,19 +117,20 @@ class RasterHeightField:
 
     def _read_window(self, window: Window) -> NDArray[np.float64]:
         """Returns metres; NaN in gaps."""
-        data, implausible = read_metres(self._dataset, window, self._scale)
+        data, implausible = read_metres(self._dataset, window, self._scale, self._damage, str(self._dataset.name))
         self.implausible += implausible
         return data
 
 
-def read_metres(dataset: Any, window: Window, scale: tuple[float, float]) -> tuple[NDArray[np.float64], int]:
-    """Returns the heights of a window in metres, NaN in gaps, and the number of implausible ones. Raises ImportFailed."""
-    try:
-        band = dataset.read(1, window=window, masked=True)
-    except Exception as error:
-        top = window.row_off
-        raise ImportFailed(f"{dataset.name}: cannot read rows {top} to {top + window.height}; the file may be damaged: {error}") from error
-    data = np.where(np.ma.getmaskarray(band), np.nan, band.data.astype(np.float64) * scale[0] + scale[1])
+def read_metres(dataset: Any, window: Window, scale: tuple[float, float], damage: Damage, name: str) -> tuple[NDArray[np.float64], int]:
+    """Returns the heights of a window in metres, NaN in gaps and where the raster `name` cannot be read, and the number of implausible ones."""
+    data = np.full((int(window.height), int(window.width)), np.nan)
+
+    def read(part: Window, _rows: int) -> Any:
+        return read_checked(dataset, 1, window=part, masked=True)
+
+    for rows, band in read_parts(window, int(window.height), dataset.block_shapes[0][0], read, partial(damage.add, name)):
+        data[rows] = np.where(np.ma.getmaskarray(band), np.nan, band.data.astype(np.float64) * scale[0] + scale[1])
     with np.errstate(invalid="ignore"):
         implausible = np.abs(data) > MAX_HEIGHT_M
     data[implausible | ~np.isfinite(data)] = np.nan
