@@ -35,7 +35,7 @@ def imported(folder: Path, *photos: Path, **options: Any) -> tuple[np.ndarray, d
 @pytest.mark.parametrize(
     ("values", "bits", "range_", "words"),
     [
-        (PHOTO.astype(float), 0, (0, 255), "bytes"),
+        (PHOTO.astype(float), 0, (0, 255), ""),
         (PHOTO / 255.0, 0, (0, 1), "shares"),
         (PHOTO * 257.0, 0, (0, 65_535), "16 bits"),
         (PHOTO[PHOTO < 40] * 257.0, 0, (0, 65_535), "16 bits"),

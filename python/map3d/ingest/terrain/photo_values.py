@@ -60,7 +60,7 @@ def find_range(values: Values, *, bits: int = 0, whole_numbers: bool = True) -> 
         return ValueRange()
     low, high = float(values.min()), float(values.max())
     if low >= 0 and high <= 255:
-        return ValueRange(0.0, 1.0, "shares of 1") if high <= 1.0 else ValueRange(words="bytes in a wider type")
+        return ValueRange(0.0, 1.0, "shares of 1") if high <= 1.0 else ValueRange()
     if whole_numbers and low >= 0:
         if 8 < bits <= 16 and high < 2**bits:
             return ValueRange(high=2.0**bits - 1, words=f"{bits} bits, as the file says")
