@@ -94,6 +94,8 @@ def test_words_and_names_tell_the_order() -> None:
     assert named_axes("urn:ogc:def:crs:EPSG::2180", poland) == "north-east"
     assert named_axes("http://www.opengis.net/def/crs/EPSG/0/25832", utm) == "east-north"
     assert named_axes("EPSG:2180", poland) == "auto"
+    assert named_axes(poland.to_wkt(), poland) == "north-east"
+    assert named_axes(poland.to_wkt("WKT1_GDAL"), poland) == "east-north"
 
 
 def test_mirrored_surfaces_face_the_other_way(tmp_path: Path) -> None:

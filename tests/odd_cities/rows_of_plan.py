@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
-from pyproj import Transformer
+from pyproj import CRS, Transformer
 
 from tests.odd_cities.contradictions import Row, Size
 from tests.odd_cities.strays import move_corner, move_polygon
@@ -167,6 +168,10 @@ AXES: list[Row] = [
         *extent("EPSG:2180", corners("EPSG:2180", FIELDS), corners("EPSG:2180", BESIDE_FIELDS, side=1, turn_deg=0.0)),
         17,
         ("axes-like-other-files",),
+    ),
+    *(
+        Row(f"{form} of 2180, northing first", town(escape(text, {'"': "&quot;"}), WARSAW, "EPSG:2180", NORTH_FIRST), *only("EPSG:2180", WARSAW), 16)
+        for form, text in (("WKT 2", CRS.from_epsg(2180).to_wkt()), ("PROJJSON", CRS.from_epsg(2180).to_json()))
     ),
     *(
         Row(f"URN of {code}, northing first", town(URN + str(code), place, f"EPSG:{code}", NORTH_FIRST), *only(f"EPSG:{code}", place), 16)

@@ -82,6 +82,11 @@ def read_name(text: str) -> CRS:
     return _read_adv(text) or _read_compound(text) or _read_epsg(text) or _read_ogc(text) or CRS.from_user_input(text)
 
 
+def is_description(text: str) -> bool:
+    """Whether a text is WKT or PROJJSON, which states the order of its axes."""
+    return _STRUCTURED.match(text) is not None
+
+
 def is_short_name(text: str) -> bool:
     """Whether a text names a CRS in the catalogue of PROJ, other than a description, which only a limited process parses."""
     return len(text) <= MAX_SHORT_NAME and not _STRUCTURED.match(text) and "+proj" not in text and "+init" not in text

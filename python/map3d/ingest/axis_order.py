@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pyproj import CRS
 
+from map3d.geometry.crs import horizontal_crs
+from map3d.geometry.crs_names import is_description
 from map3d.ingest.document_sample import Ring
 from map3d.requests.reading import Axes
 
@@ -48,7 +50,9 @@ def labelled_axes(labels: str) -> Axes:
 
 
 def named_axes(name: str, horizontal: CRS) -> Axes:
-    """Returns the authority's order if the name is of a form that means it, a URN or the address of a definition."""
+    """Returns the authority's order if the name is of a form that means it, a URN or the address of a definition; that of a description."""
+    if is_description(name):
+        return "north-east" if is_north_first(horizontal_crs(CRS.from_user_input(name))) else "east-north"
     if not name.strip().lower().startswith(_BY_AUTHORITY):
         return "auto"
     return "north-east" if is_north_first(horizontal) else "east-north"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 HEAD_BYTES: Final = 128 << 10
 WINDOW_BYTES: Final = 64 << 10
 WINDOWS: Final = 6
-MAX_NAME: Final = 4096
+MAX_NAME: Final = 16_384
 
 _GZIP: Final = b"\x1f\x8b"
 _WIDE: Final = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}

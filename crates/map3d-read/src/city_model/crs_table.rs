@@ -14,7 +14,7 @@ pub const DOCUMENT_CRS: CrsNumber = 0;
 /// Stands for all beyond `MAX_SYSTEMS`; coordinates in them are skipped.
 pub const TOO_MANY: CrsNumber = CrsNumber::MAX;
 const MAX_SYSTEMS: usize = 32;
-const MAX_NAME_CHARS: usize = 1024;
+const MAX_NAME_CHARS: usize = 16_384;
 
 pub struct CrsTable {
     /// As the document writes them; the first is `None` if the document names none.
