@@ -171,7 +171,7 @@ AXES: list[Row] = [
     ),
     *(
         Row(f"{form} of 2180, northing first", town(escape(text, {'"': "&quot;"}), WARSAW, "EPSG:2180", NORTH_FIRST), *only("EPSG:2180", WARSAW), 16)
-        for form, text in (("WKT 2", CRS.from_epsg(2180).to_wkt()),)
+        for form, text in (("WKT 2", CRS.from_epsg(2180).to_wkt()), ("PROJJSON", CRS.from_epsg(2180).to_json()))
     ),
     *(
         Row(f"URN of {code}, northing first", town(URN + str(code), place, f"EPSG:{code}", NORTH_FIRST), *only(f"EPSG:{code}", place), 16)
