@@ -4,6 +4,7 @@ Documents pass as JSON text, arrays as NumPy, frames as `Frame`. Errors: `CoreEr
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any, Literal, final
 
 import numpy as np
@@ -85,7 +86,7 @@ class Reader:
 
     options (JSON): {"transparency": "auto"|"as-is"|"inverted", "strict": bool, "max_image_side_px": 16384, … further limits}, of OBJ also
     {"up": "y"|"z", "split": "file"|"group"}, of CityGML {"theme": str|null (null: the one with the most textures), "lod": str|null (null: best per
-    object), "interiors": bool, "appearance_files": [path, …]}; those of another format raise InvalidArgument
+    object), "interiors": bool, "at": date|null (null: today), "appearance_files": [path, …]}; those of another format raise InvalidArgument
     transform: (source, target, [(x, y), …]) → [(x, y), …] from one coordinate system to another, both as documents write them; None if there is
     no transformation. It places textures that are in another one than their surfaces.
     """
@@ -162,6 +163,22 @@ def detect_format(head: bytes) -> str | None:
 def xml_root(head: bytes) -> str | None:
     """Returns the local name of the first element of XML, empty without one; None for anything else."""
 
+def utf16_encoding(head: bytes) -> Literal["UTF-16LE", "UTF-16BE"] | None:
+    """Returns the encoding if a text is in UTF-16, with a byte order mark or without; None for any other. `head`: its first bytes."""
+
+def texture_map_name(statement: bytes) -> str | None:
+    """Returns the file name in a `map_…` statement of a material library. `statement`: what follows the keyword."""
+
+@final
+class FileFinder:
+    """Finds the files that documents name, as the readers do."""
+    def __init__(self, base: str, root: str | None = None) -> None:
+        """`base`: folder to which names are relative; `root`: folder that they may lead into, by default `base`. Raises StorageError."""
+    def find(self, name: str) -> tuple[Path | None, bool]:
+        """Returns the file of a name as the document writes it, None if there is none; and whether the name is that of a file rather than a URL."""
+    def library_names(self, statement: bytes) -> list[str]:
+        """Returns the names of the files of a `mtllib` statement of an OBJ file. `statement`: what follows the keyword."""
+
 def check_file(path: str) -> None:
     """Raises FormatError unless a mesh, chunk, instance or texture file has a known version and the checksum of its header."""
 
@@ -179,6 +196,10 @@ def build_scene(folder: str, request: str, progress: Progress | None = None) -> 
     request: {"assets": ["name", …], "origin": [x,y,z], "options": {"merge_vertices": true, "merge_faces": true, "drop_degenerate": true,
     "merge_materials": true, "drop_untextured": false, "ground_plane": "auto"|"on"|"off", "keep_outliers": false, "cluster": 0}, "ground_id": u32, "threads": n, "max_memory_bytes": n}
     """
+
+def find_damaged_images(folder: str, threads: int = 0) -> str:
+    """Decodes all images of an asset; returns those that cannot be used, by their keys: {key: {"code", "values"}} (JSON), a message each.
+    `threads` = 0: one per core."""
 
 def find_clusters(folders: list[str], origin: _Vec3, options: str) -> str:
     """Returns where the content of asset folders is (JSON): {"clusters": [{"box", "triangles", "objects"}], largest first; "extent" of what a scene
@@ -394,6 +415,9 @@ def encode_bits(bits: NDArray[np.bool_]) -> bytes:
 
 def decode_png(data: bytes) -> NDArray[np.uint8]:
     """Decodes an 8-bit PNG into (H, W, C)."""
+
+def decode_image(data: bytes) -> NDArray[np.uint8]:
+    """Decodes the image of a texture, in any format that is read, into (H, W, 4), sRGB with straight alpha. Raises FormatError for a cut or damaged one."""
 
 def encode_data_tile(normal: NDArray[np.int16], id: NDArray[np.uint32], depth: NDArray[np.uint32], small: bool = False) -> bytes:
     """Encodes normal (H, W, 3), id and depth (H, W) of a G-buffer as one data tile (spec/data-tile.md); `small` trades time for fewer bytes."""

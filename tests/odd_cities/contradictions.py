@@ -23,8 +23,8 @@ Size = tuple[float, float, float]
 @dataclass(frozen=True)
 class Row:
     """`build` writes a folder. What a build draws of it: `objects`, their number; `at`, the longitude and latitude of their middle; `size_m`, their
-    extent along x, y and z. `said`: the codes of all findings, and of the notes about files that are no
-    documents; `options`: of the import; `failed`: parts of the reasons for which files are refused."""
+    extent along x, y and z; `textures`, the number of images; `left_out`, that of triangles far from the rest. `said`: the codes of all findings,
+    and of the notes about files that are no documents; `options`: of the import; `failed`: parts of the reasons for which files are refused."""
 
     name: str
     build: Callable[[Path], Any]
@@ -35,6 +35,7 @@ class Row:
     options: Mapping[str, Any] = field(default_factory=dict)
     failed: tuple[str, ...] = ()
     left_out: int = 0
+    textures: int = 0
 
 
 @dataclass(frozen=True)
@@ -45,12 +46,14 @@ class Drawn:
     said: tuple[str, ...]
     failed: tuple[str, ...]
     left_out: int
+    textures: int
 
     def __str__(self) -> str:
         size = " × ".join(f"{value:,.1f}" for value in self.size_m)
         said = ", ".join([*self.said, *self.failed]) or "nothing"
         left_out = f", {self.left_out} triangles left out" if self.left_out else ""
-        return f"{self.objects} objects, {size} m, {find_place(*self.at)}{left_out} | {said}"
+        textures = f", {self.textures} textures" if self.textures else ""
+        return f"{self.objects} objects{textures}, {size} m, {find_place(*self.at)}{left_out} | {said}"
 
 
 def draw(folder: Path, options: Mapping[str, Any]) -> Drawn:
@@ -70,10 +73,11 @@ def draw(folder: Path, options: Mapping[str, Any]) -> Drawn:
     to_degrees = Transformer.from_crs(horizontal_crs(parse_crs(scene.crs.wkt)), "EPSG:4326", always_xy=True)
     lon, lat = to_degrees.transform(*((low + high) / 2)[:2])
     said = sorted({found.reason.code for asset in assets for found in findings(asset.report)} | {note.code for _, note in done.ignored})
+    textures = sum(len(list((one / "textures").iterdir())) for one in folders)
     x, y, z = high - low
     failed = tuple(str(reason) for _, reason in done.failed)
     left_out = sum(sum(outside) for _, outside in within)
-    return Drawn((lon, lat), (float(x), float(y), float(z)), len(boxes), tuple(said), failed, left_out)
+    return Drawn((lon, lat), (float(x), float(y), float(z)), len(boxes), tuple(said), failed, left_out, textures)
 
 
 def check(row: Row, folder: Path) -> str:
@@ -83,7 +87,7 @@ def check(row: Row, folder: Path) -> str:
     line = f"{row.name} | {drawn}"
     assert np.allclose(drawn.at, row.at, rtol=0.0, atol=3e-5), line
     assert np.allclose(drawn.size_m, row.size_m, rtol=0.004, atol=0.05), line
-    assert (drawn.objects, drawn.left_out) == (row.objects, row.left_out), line
+    assert (drawn.objects, drawn.left_out, drawn.textures) == (row.objects, row.left_out, row.textures), line
     assert drawn.said == tuple(sorted(row.said)), line
     assert len(drawn.failed) == len(row.failed), line
     assert all(part in reason for part, reason in zip(row.failed, drawn.failed, strict=True)), line

@@ -58,6 +58,8 @@ reasons! {
     ImageSideOverLimit = "image-side-over-limit": Warning,
     ImagePixelsOverLimit = "image-pixels-over-limit": Warning,
     ImageUnreadable = "image-unreadable": Warning,
+    ImageDamaged = "image-damaged": Warning,
+    ImageKindNotRead = "image-kind-not-read": Warning,
     ImageUnusable = "image-unusable": Warning,
     GeoreferencedTextureWithoutPlace = "georeferenced-texture-without-place": Warning,
     GeoreferencedTextureInOtherCrs = "georeferenced-texture-in-other-crs": Warning,
@@ -77,6 +79,8 @@ reasons! {
     OtherFileReferencesTooMany = "other-file-references-too-many": Warning,
     OtherFileBroken = "other-file-broken": Note,
     AppearanceTargetNotFound = "appearance-target-not-found": Warning,
+    AppearanceTargetMissing = "appearance-target-missing": Warning,
+    AppearanceTargetIsRing = "appearance-target-is-ring": Note,
     AppearanceForOtherFile = "appearance-for-other-file": Note,
     MaterialNotDefined = "material-not-defined": Warning,
     TinMaxLengthInvalid = "tin-max-length-invalid": Warning,
@@ -103,6 +107,7 @@ reasons! {
     FileNameBackslashes = "file-name-backslashes": Note,
     FileNamePercentEncoded = "file-name-percent-encoded": Note,
     FileNameCaseDiffers = "file-name-case-differs": Note,
+    FileNameAbsolute = "file-name-absolute": Note,
     TransparencyReadAsOpacity = "transparency-read-as-opacity": Note,
     TransparentSurfacesNotDrawn = "transparent-surfaces-not-drawn": Note,
     InteriorsNotDrawn = "interiors-not-drawn": Note,
@@ -113,6 +118,7 @@ reasons! {
     GzipDamaged = "gzip-damaged": Warning,
     NothingAtLod = "nothing-at-lod": Note,
     ThemeUsed = "theme-used": Note,
+    ThemeWithoutImages = "theme-without-images": Note,
     ThemeNotInFile = "theme-not-in-file": Note,
     AppearanceOfOtherTheme = "appearance-of-other-theme": Note,
     AppearanceOfBackSide = "appearance-of-back-side": Note,
@@ -145,10 +151,13 @@ reasons! {
     PointsAndLines = "points-and-lines": Omitted,
     PolygonInSeveralCrs = "polygon-in-several-crs": Skipped,
     PolygonCrsTooMany = "polygon-crs-too-many": Skipped,
+    VersionEnded = "version-ended": Omitted,
+    VersionOfOtherDate = "version-of-other-date": Omitted,
     PolygonOfInterior = "polygon-of-interior": Omitted,
     PolygonNotTriangulated = "polygon-not-triangulated": Skipped,
     PolygonWithTooManyVertices = "polygon-with-too-many-vertices": Skipped,
     PolygonCoordinatesUnreadable = "polygon-coordinates-unreadable": Skipped,
+    PolygonWithoutHeight = "polygon-without-height": Warning,
     PolygonWithoutArea = "polygon-without-area": Skipped,
     PolygonWithoutRings = "polygon-without-rings": Skipped,
     RingWithTooFewPoints = "ring-with-too-few-points": Skipped,
@@ -189,6 +198,20 @@ reasons! {
 }
 
 impl Reason {
+    /// Returns true if the examples are files that people have to repair: a report names the first of them.
+    pub fn names_files(self) -> bool {
+        matches!(
+            self,
+            Self::ImageFormatUnknown
+                | Self::ImageFormatNotRead
+                | Self::ImageHeaderInvalid
+                | Self::ImageWithoutPixels
+                | Self::ImageUnreadable
+                | Self::ImageDamaged
+                | Self::ImageKindNotRead
+        )
+    }
+
     /// Returns the reason with a value that its text names.
     pub fn with(self, name: &'static str, value: impl Into<Value>) -> Message {
         Message { reason: self, values: BTreeMap::from([(name, value.into())]) }

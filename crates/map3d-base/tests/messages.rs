@@ -10,6 +10,7 @@ fn reasons_are_rows_of_the_specification() {
     for reason in Reason::ALL {
         let row = &rows[reason.code()];
         assert_eq!(row["severity"], format!("{:?}", reason.severity()).to_lowercase(), "{}", reason.code());
+        assert_eq!(row["names_files"] == true, reason.names_files(), "{}", reason.code());
     }
 }
 

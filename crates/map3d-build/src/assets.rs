@@ -196,11 +196,6 @@ impl Asset {
         Ok(asset)
     }
 
-    /// Whether surfaces have no colour of their own: a build then looks at the objects.
-    pub fn has_uncolored(&self) -> bool {
-        self.materials.iter().any(|m| m.surface.is_some())
-    }
-
     pub fn objects_path(&self) -> PathBuf {
         self.folder.join(OBJECTS)
     }

@@ -45,19 +45,19 @@ impl BuildMaterials {
         let mut out = Self { records: Vec::new(), assets: Vec::new(), hashes: Vec::new(), without_their_texture: Vec::new() };
         let mut known = HashMap::new();
         for asset in assets {
-            let numbers = asset.materials.iter().map(|m| match m.surface {
+            let numbers = asset.materials.iter().map(|m| match surface_of(m, textures) {
                 Some(class) => MaterialNumber::OfSurface(class),
                 None => MaterialNumber::Own(out.add(record_of(m, textures), options.merge_materials, &mut known)),
             });
             let numbers = numbers.collect();
-            let colors = if asset.has_uncolored() { SurfaceColors::read(&asset.objects_path(), &options.style)? } else { SurfaceColors::default() };
+            let has_uncolored = asset.materials.iter().any(|m| surface_of(m, textures).is_some());
+            let colors = if has_uncolored { SurfaceColors::read(&asset.objects_path(), &options.style)? } else { SurfaceColors::default() };
             let colored = (0..colors.len()).map(|palette| {
                 SurfaceClass::ALL.map(|class| out.add(plain(colors.color(palette, class, &options.style)), options.merge_materials, &mut known))
             });
             let colored = colored.collect();
             out.assets.push(AssetMaterials { numbers, colors, colored });
-            let lacks = |m: &&Material| (m.texture.is_some() || m.alpha.is_some()) && textures.get(m).is_none();
-            out.without_their_texture.push(asset.materials.iter().filter(lacks).count() as u64);
+            out.without_their_texture.push(asset.materials.iter().filter(|m| lacks_texture(m, textures)).count() as u64);
         }
         Ok(out)
     }
@@ -112,6 +112,17 @@ impl BuildMaterials {
     pub fn is_textured(&self, number: u32) -> bool {
         self.records[number as usize].is_textured()
     }
+}
+
+/// Returns true for a material whose image is missing or broken.
+fn lacks_texture(material: &Material, textures: &TextureKeys) -> bool {
+    (material.texture.is_some() || material.alpha.is_some()) && textures.get(material).is_none()
+}
+
+/// Returns what a surface without a colour of its own is: white stands for the colours of an image, also of one that is missing.
+fn surface_of(material: &Material, textures: &TextureKeys) -> Option<SurfaceClass> {
+    let is_white = material.diffuse == [1.0; 4];
+    material.surface.or_else(|| (is_white && lacks_texture(material, textures)).then_some(SurfaceClass::Other))
 }
 
 fn record_of(material: &Material, textures: &TextureKeys) -> MaterialRecord {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use map3d_texture::TextureFault;
 use serde::{Deserialize, Serialize};
 
 /// Part of `scene.json`, and returned to the caller; contains every count, even 0, except for that of outliers.
@@ -35,6 +36,9 @@ pub struct BuildReport {
     pub outlier_triangles: u64,
     /// By reason, the number of images that failed and an example.
     pub texture_warnings: BTreeMap<String, String>,
+    /// Why images cannot be used, by their keys in the assets.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub texture_faults: BTreeMap<String, TextureFault>,
 }
 
 impl BuildReport {

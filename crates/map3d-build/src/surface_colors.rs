@@ -183,7 +183,7 @@ mod tests {
 
     fn object(name: &str, class: &str, parent: Option<u32>, attributes: &[(&str, serde_json::Value)]) -> Object {
         let attributes = attributes.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect();
-        Object { name: name.into(), class: class.into(), parent, lod: None, attributes }
+        Object { name: name.into(), class: class.into(), parent, lod: None, attributes, without_height: false }
     }
 
     fn surface_colors(objects: &[Object], rules: &[StyleRule]) -> SurfaceColors {

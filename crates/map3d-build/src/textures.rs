@@ -33,6 +33,7 @@ pub(crate) fn build_changed(
     keys.by_source.extend(known);
     report.textures = keys.by_source.len() as u64;
     report.textures_kept = report.textures - keys.written;
+    report.texture_faults = keys.faults.clone();
     report.texture_warnings =
         keys.missing.iter().map(|(reason, missing)| (reason.clone(), format!("{}, first: {}", missing.count, missing.example))).collect();
     Ok(keys)

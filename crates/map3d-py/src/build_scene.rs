@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use map3d_build::BuildRequest;
+use map3d_texture::find_damaged_images as find_damaged;
 use pyo3::prelude::*;
 
 use crate::errors::{invalid, to_python};
@@ -29,4 +30,12 @@ pub fn build_scene(py: Python<'_>, folder: PathBuf, request: &str, progress: Opt
         Some(error) => Err(error),
         None => report.map(|r| serde_json::to_string(&r).expect("reports are plain data")).map_err(to_python),
     }
+}
+
+/// Decodes all images of an asset; returns those that cannot be used, by their keys: {key: {"code", "values"}} (JSON). `threads` = 0: one per core.
+#[pyfunction]
+#[pyo3(signature = (folder, threads=0))]
+pub fn find_damaged_images(py: Python<'_>, folder: PathBuf, threads: usize) -> PyResult<String> {
+    let faults = py.detach(|| find_damaged(&folder, threads)).map_err(to_python)?;
+    Ok(serde_json::to_string(&faults).expect("faults are plain data"))
 }

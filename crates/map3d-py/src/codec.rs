@@ -1,10 +1,10 @@
 //! G-buffers as NumPy arrays, layers as image bytes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use map3d_base::layers::PixelType;
 use map3d_image::encode::{self, Encoder};
-use map3d_image::{GBuffer, PixelArray, data_tile};
+use map3d_image::{GBuffer, ImageLimits, PixelArray, Raster, data_tile, decode};
 use map3d_texture::TextureFile;
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -162,10 +162,21 @@ pub fn decode_png<'py>(py: Python<'py>, data: &[u8]) -> PyResult<Bound<'py, PyAr
     Ok(Array3::from_shape_vec(shape, image.pixels).map_err(|e| invalid(e.to_string()))?.into_pyarray(py))
 }
 
+/// Decodes the image of a texture, in any format that is read, into (H, W, 4) uint8, sRGB with straight alpha.
+#[pyfunction]
+pub fn decode_image<'py>(py: Python<'py>, data: &[u8]) -> PyResult<Bound<'py, PyArray3<u8>>> {
+    let raster = py.detach(|| decode::decode(Path::new("image"), data, &ImageLimits::default())).map_err(to_python)?;
+    rows4(py, raster)
+}
+
 /// Decodes a level of a .m3t file into (H, W, 4) uint8, sRGB with straight alpha, unused texels filled.
 #[pyfunction]
 pub fn texture_level<'py>(py: Python<'py>, path: PathBuf, level: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
     let raster = py.detach(|| TextureFile::open(&path)?.level(level)).map_err(to_python)?;
+    rows4(py, raster)
+}
+
+fn rows4(py: Python<'_>, raster: Raster) -> PyResult<Bound<'_, PyArray3<u8>>> {
     let flat = raster.pixels.into_flattened();
     let array = numpy::PyArray1::from_vec(py, flat);
     array.reshape([raster.height as usize, raster.width as usize, 4])

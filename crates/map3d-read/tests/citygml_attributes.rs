@@ -33,7 +33,7 @@ fn attributes_of_extensions_are_named_after_their_path() {
             "buildingIDAttribute/buildingID": "14201-bldg-110968", "buildingIDAttribute/branchID": "1",
             "buildingDetailAttribute/totalFloorArea": 42.5, "buildingDetailAttribute/surveyYear": "2016",
             "buildingDisasterRiskAttribute/BuildingTsunamiRiskAttribute/depth": 0.7,
-            "owner": "Smith, Jones", "area": 50, "unit/equippedWith/Heating/power": 4000,
+            "owner": "Smith, Jones", "area": 50, "unit/equippedWith/Heating/power": 4000, "unit/equippedWith/Heating/power/unit": "W",
             "plain/a": "1", "plain/b/c": "x",
         })
     );
@@ -50,7 +50,7 @@ fn repeated_data_types_are_numbered_and_pairs_are_named_after_their_key() {
     assert_eq!(
         attributes_of(&(noise(5) + &noise(7) + &noise(5) + &pairs)),
         json!({
-            "segmentProperty/mDay": 5, "segmentProperty[2]/mDay": 7, "segmentProperty[3]/mDay": 5,
+            "segmentProperty/mDay": 5, "segmentProperty/mDay/unit": "1/h", "segmentProperty[2]/mDay": 7, "segmentProperty[2]/mDay/unit": "1/h", "segmentProperty[3]/mDay": 5, "segmentProperty[3]/mDay/unit": "1/h",
             "keyValuePairAttribute/104": "1", "keyValuePairAttribute/105": 2.5,
         })
     );

@@ -1,6 +1,8 @@
 //! File names in user data resolve only inside the asset's folder; image headers are checked before the image is used.
 
 use crate::documents::{Folder, ParsedDocument, detect_file, encode_png, read_with};
+use map3d_image::Raster;
+use map3d_image::encode::encode_jpeg;
 use map3d_read::{AssetFolder, FileError, FileHead, HEAD_BYTES, OBJ, ReadOptions, detect};
 
 #[test]
@@ -27,6 +29,14 @@ fn names_resolve_only_inside_the_folder() {
         "Sub/../a b.png",
         "100%25.png",
         "good-link.png",
+        "\"a b.png\"",
+        "'sub/c.png'",
+        "/Sub/C.PNG",
+        "C:\\Projects\\inner\\Sub\\C.PNG",
+        "C:a b.png",
+        "\\\\server\\share\\a b.png",
+        "file:///C:/elsewhere/a%20b.png",
+        "file://server/sub/c.png",
         absolute.to_str().expect("utf-8"),
         &format!("file://{}", absolute.display()),
         "file:a b.png",
@@ -41,6 +51,8 @@ fn names_resolve_only_inside_the_folder() {
         ("link.png", FileError::OutsideFolder),
         (secret.to_str().expect("utf-8"), FileError::OutsideFolder),
         ("/etc/passwd", FileError::OutsideFolder),
+        ("/elsewhere/secret.png", FileError::OutsideFolder),
+        ("C:\\inner\\..\\..\\secret.png", FileError::OutsideFolder),
         ("C:\\texture.png", FileError::OutsideFolder),
         ("http://host.example/a.png", FileError::Url),
         ("HTTPS://host.example/a.png", FileError::Url),
@@ -114,8 +126,7 @@ fn invalid_images_are_skipped() {
 
 #[test]
 fn image_extension_follows_the_content() {
-    let mut jpeg = vec![0xFF, 0xD8, 0xFF, 0xC0, 0, 17, 8, 0, 5, 0, 7, 3];
-    jpeg.resize(200, 0);
+    let jpeg = encode_jpeg(&Raster::filled(7, 5, [9, 9, 9, 255]), 80).expect("encodes");
     let document = read_with_image(&jpeg, &ReadOptions::default());
     assert_eq!((document.textures[0].extension, document.textures[0].width_px, document.textures[0].height_px), ("jpg", 7, 5));
 }

@@ -14,6 +14,7 @@ mod large_polygons;
 mod made_up_format;
 mod mutation;
 mod obj;
+mod odd_documents;
 mod prototypes;
 mod real_data;
 mod references;

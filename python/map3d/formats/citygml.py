@@ -8,42 +8,49 @@ from typing import Final
 
 from map3d import _core
 from map3d.formats.citygml_links import find_document_links, find_geometry_documents
-from map3d.formats.file_names import MAX_NAME_BYTES, FileNames, existing_files, match, missing, names_in
+from map3d.formats.file_names import MAX_NAME_BYTES, FileNames, FindNames, find_texts, match, xml_name
 from map3d.formats.source_format import IMAGE_SUFFIXES, LinkedDocuments, MissingFiles, SourceFormat
 
 _NAME: Final = "citygml"
 # Every pattern is bounded or excludes what follows it, so that a hostile file costs no more than its length.
-_TAGS: Final = (b"imageURI>", b"textureMap>", b"libraryObject>", b"fileName>", b"fileReference>")
-_IMAGE_TAGS: Final = _TAGS[:2]
-_LIBRARY_TAGS: Final = _TAGS[2:3]
+_IMAGE_TAGS: Final = (b"imageURI>", b"textureMap>")
+_OTHER_TAGS: Final = (b"libraryObject>", b"fileName>", b"fileReference>")
+_LIBRARY_TAGS: Final = _OTHER_TAGS[:1]
 _MODEL_SUFFIXES: Final = (".gml", ".xml", ".obj")
 """Those of libraries that are read."""
 _CODE_LIST: Final = re.compile(rb"""codeSpace=["']([^"'<>]{1,4096}\.(?:xml|gml))["']""", re.IGNORECASE)
 
 
 def _find_files(path: Path, root: Path | None = None) -> set[Path]:
-    return set(existing_files(path, _find_elements, [FileNames.of(path, root)])) | _find_code_lists(path, root)
+    return _existing(path, _find_elements, root) | _find_code_lists(path, root)
 
 
 def _find_code_lists(path: Path, root: Path | None = None) -> set[Path]:
     """Returns the dictionaries of codes that a document names."""
-    return set(existing_files(path, match(_CODE_LIST), [FileNames.of(path, root)]))
+    return _existing(path, match(_CODE_LIST), root)
+
+
+def _existing(path: Path, find: FindNames, root: Path | None) -> set[Path]:
+    names = FileNames.of(path, root)
+    return {file for text in find_texts(path, find) if (file := names.find(xml_name(text))) is not None}
 
 
 def _find_missing(path: Path, root: Path | None = None) -> MissingFiles:
-    folders = [FileNames.of(path, root)]
-    images, missing_images = names_in(path, _find_images), missing(path, _find_images, folders)
-    return MissingFiles(sorted(missing(path, _find_elements, folders)), len(images), len(missing_images))
+    names = FileNames.of(path, root)
+    images, others = (
+        {name for name in map(xml_name, find_texts(path, find)) if names.is_file_name(name)} for find in (_find_images, _find_other_files)
+    )
+    missing_images, missing_others = ({name for name in found if names.find(name) is None} for found in (images, others))
+    return MissingFiles(sorted(missing_images | missing_others), len(images), len(missing_images))
 
 
 def _find_used(path: Path, root: Path | None = None) -> dict[Path, str]:
     """Returns the textures, code lists and libraries of geometry that a document names; they are read with it."""
-    folders = [FileNames.of(path, root)]
-    models = {file for file in existing_files(path, _find_libraries, folders) if file.suffix.lower() in _MODEL_SUFFIXES}
+    models = {file for file in _existing(path, _find_libraries, root) if file.suffix.lower() in _MODEL_SUFFIXES}
     return {
         **dict.fromkeys(models | find_geometry_documents(path, root), "used-as-geometry"),
         **dict.fromkeys(_find_code_lists(path, root), "used-as-code-list"),
-        **dict.fromkeys(existing_files(path, _find_images, folders), "used-as-texture"),
+        **dict.fromkeys(_existing(path, _find_images, root), "used-as-texture"),
     }
 
 
@@ -55,7 +62,11 @@ def _find_images(text: mmap | bytes) -> Iterator[bytes]:
     return _find_elements(text, _IMAGE_TAGS)
 
 
-def _find_elements(text: mmap | bytes, tags: Sequence[bytes] = _TAGS) -> Iterator[bytes]:
+def _find_other_files(text: mmap | bytes) -> Iterator[bytes]:
+    return _find_elements(text, _OTHER_TAGS)
+
+
+def _find_elements(text: mmap | bytes, tags: Sequence[bytes] = _IMAGE_TAGS + _OTHER_TAGS) -> Iterator[bytes]:
     """Yields the content of the elements that contain file names. It uses plain search, because city models are large and such elements rare."""
     for tag in tags:
         at = text.find(tag)
@@ -78,7 +89,7 @@ CITYGML: Final = SourceFormat(
     suffixes=(".gml", ".citygml"),
     companions=(".jpg", ".jpeg", ".png", ".bmp", ".gif", ".tga", ".xsd"),
     options=("theme", "lod", "transparency"),
-    sparse_options=("interiors",),
+    sparse_options=("interiors", "at"),
     names_files=True,
     find_files=_find_files,
     find_missing=_find_missing,

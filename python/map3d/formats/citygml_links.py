@@ -10,8 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from map3d.formats.file_names import FileNames
-from map3d.formats.gzip_file import content_windows, is_gzip
+from map3d.formats.file_names import FileNames, text_windows, xml_name
 from map3d.formats.source_format import DocumentLinks
 
 MAX_CHAIN: Final = 16
@@ -20,7 +19,7 @@ _MAX_NAME_BYTES: Final = 4096
 _SUFFIXES: Final = (b"ml#", b"ML#", b".gz#", b".GZ#")
 """Ends of the names of other documents, with the sign before the id: .gml, .xml, .citygml."""
 _DELIMITERS: Final = (b'"', b"'", b">")
-_OBJECT_MEMBERS: Final = (b"bjectMember", b"eatureMember")
+_OBJECT_MEMBERS: Final = (b"bjectMember", b"eatureMember", b":member>", b"<member>")
 
 
 def find_document_links(path: Path, root: Path | None = None) -> DocumentLinks:
@@ -52,9 +51,9 @@ class _NamesInDocument:
 
 
 @lru_cache(maxsize=65536)
-def _read_names(path: Path, _mtime_ns: int, size: int) -> _NamesInDocument:
+def _read_names(path: Path, _mtime_ns: int, _size: int) -> _NamesInDocument:
     geometry, targets, has_objects = set[bytes](), set[bytes](), False
-    for text in _windows(path, size):
+    for text in text_windows(path, 2 * _MAX_NAME_BYTES):
         has_objects = has_objects or any(text.find(word) >= 0 for word in _OBJECT_MEMBERS)
         for name, is_href in _find_names(text):
             (geometry if is_href else targets).add(name)
@@ -62,16 +61,8 @@ def _read_names(path: Path, _mtime_ns: int, size: int) -> _NamesInDocument:
 
 
 def _resolve(names: FileNames, found: frozenset[bytes], document: Path) -> frozenset[Path]:
-    paths = (path for name in found for path in names.find(name.decode("utf-8", "replace")))
-    return frozenset(path for path in paths if path != document)
-
-
-def _windows(path: Path, size: int) -> Iterator[mmap.mmap | bytes]:
-    if is_gzip(path):
-        yield from content_windows(path, 2 * _MAX_NAME_BYTES)
-    elif size:
-        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as text:
-            yield text
+    paths = (names.find(xml_name(name)) for name in found)
+    return frozenset(path for path in paths if path is not None and path != document)
 
 
 def _find_names(text: mmap.mmap | bytes) -> Iterator[tuple[bytes, bool]]:

@@ -2,9 +2,12 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Final
 
 from map3d.messages import Message, message, table
+
+MAX_NAMED_FILES: Final = 5
+"""Files that a finding names."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,17 @@ class Finding:
         return bool(table().get(self.reason.code, {}).get("failed_file"))
 
     @property
+    def names_files(self) -> bool:
+        """Whether it is said of files that people have to repair, the first of which are its example."""
+        return bool(table().get(self.reason.code, {}).get("names_files"))
+
+    def plus(self, other: "Finding") -> "Finding":
+        """Returns the finding with what is said of other files too: the first example, or the first names."""
+        examples = [text for text in (self.example, other.example) if text]
+        kept = ", ".join(", ".join(examples).split(", ")[:MAX_NAMED_FILES]) if self.names_files else next(iter(examples), "")
+        return replace(self, count=self.count + other.count, example=kept)
+
+    @property
     def order(self) -> tuple[Any, ...]:
         """Sorts what is said of whole files first, then what was skipped, then by count."""
         return (not self.whole_file, not self.skipped, -self.count, str(self.reason))
@@ -71,11 +85,11 @@ def report_document(report: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def sum_findings(found: Iterable[Finding]) -> list[Finding]:
-    """Returns the findings of several files together, with the first example of each."""
+    """Returns the findings of several files together, with the first example of each, or the first names of files."""
     sums: dict[str, Finding] = {}
     for item in found:
-        before = sums.setdefault(str(item.reason.document), replace(item, count=0))
-        sums[str(item.reason.document)] = replace(before, count=before.count + item.count, example=before.example or item.example)
+        key = str(item.reason.document)
+        sums[key] = sums[key].plus(item) if key in sums else item
     return sorted(sums.values(), key=lambda item: item.order)
 
 

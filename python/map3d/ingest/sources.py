@@ -125,7 +125,7 @@ def source_digest(source: SourceDocument) -> str:
     for path in source.data_paths:
         for part in [path, *_find_companions(path, source)]:
             check_stored(part)
-            total.update(part.name.encode())
+            total.update(os.fsencode(part.name))
             with part.open("rb") as file:
                 total.update(hashlib.file_digest(file, "sha256").digest())
     for path, grid in sorted(source.grids.items()):

@@ -65,6 +65,13 @@ class FormatOptions:
     )
     lod: str | None = param(None, help="CityGML: the level of detail to use.", words="the best of each object", label="CityGML: level of detail")
     interiors: bool = param(False, help="CityGML: draw rooms and what is in them.", words="leave them out", label="CityGML: draw rooms")
+    at: str | None = param(
+        None,
+        help="CityGML: draw the versions of objects that exist on this date.",
+        example="2020-01-31",
+        words="those that have not ended",
+        label="CityGML: versions of objects on the date",
+    )
     transparency: str = param(
         "auto",
         help="How transparency of materials is read; inverted: it is opacity; auto: as opacity in files whose materials would all be faint and some "

@@ -19,6 +19,7 @@ from map3d.scenes.outlier_lines import outlier_lines
 from map3d.scenes.outliers import OutlierCheck
 from map3d.scenes.scene_cache import has_assets
 from map3d.scenes.shared_scene import FILES, share_scene
+from map3d.scenes.texture_faults import report_texture_faults
 
 OPTIONS: Final[Mapping[str, Any]] = {
     "merge_vertices": True,
@@ -72,6 +73,7 @@ def build(
             }
             report = build_in_subprocess(scene, folder, request, max_memory_bytes, progress)
             outliers = check.finish(registry)
+            report_texture_faults(workspace, catalogue, scene, report.pop("texture_faults", {}))
             has_ground = report.get("ground_plane_triangles")
             registry.set_scene_object(ground, open_scene(workspace, scene).object_box(ground) if has_ground else None)
         if FILES in record.options:

@@ -128,7 +128,7 @@ def _contents(asset: AssetRecord, box: Box | None, kinds: tuple[ObjectKind, ...]
         triangles=report.get("triangles", 0),
         outside=outside,
         textures=_textures(report),
-        findings=tuple(findings(report)),
+        findings=tuple(sum_findings(findings(report))),
     )
 
 

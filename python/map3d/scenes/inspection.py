@@ -15,6 +15,7 @@ from map3d.messages import Message
 from map3d.registry import Registry
 from map3d.scenes.file_contents import FileContents, file_contents, union
 from map3d.scenes.outliers import OutlierCheck, Outliers, read_outliers
+from map3d.scenes.texture_faults import report_damaged_images
 from map3d.types import Box
 
 _SCENE: Final = "inspect"
@@ -46,6 +47,7 @@ def inspect_files(paths: Sequence[Path], options: ImportOptions, progress: OnFil
             catalogue.create_scene(SceneRecord(_SCENE))
             imported = import_files(workspace, catalogue, _SCENE, paths, options, progress=progress)
             clusters = _find_clusters(workspace, catalogue)
+            report_damaged_images(workspace, catalogue, _SCENE)
             files = tuple(file_contents(workspace, catalogue, _SCENE))
             left_out = read_outliers(workspace, _SCENE)
             crs = catalogue.scene(_SCENE).crs

@@ -129,9 +129,16 @@ pub struct Object {
     pub parent: Option<u32>,
     pub lod: Option<String>,
     pub attributes: BTreeMap<String, serde_json::Value>,
+    /// All its surfaces have two-dimensional coordinates: their height 0 means nothing.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub without_height: bool,
 }
 
-/// How often something was reported. `example`: the first occurrence: a name, a line, a file.
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// How often something was reported. `example`: the first occurrence: a name, a line, a file; of reasons that name files, the first of them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     #[serde(flatten)]
@@ -152,12 +159,20 @@ pub struct AssetReport {
     pub box_source: Option<[[f64; 3]; 2]>,
 }
 
+/// Files that a finding names.
+const MAX_NAMED_FILES: u64 = 5;
+
 impl AssetReport {
-    /// Adds `count` to what was reported; keeps the first example.
+    /// Adds `count` to what was reported; keeps the first example, or the first names of files.
     pub fn add(&mut self, message: impl Into<Message>, count: u64, example: impl FnOnce() -> String) {
         let message = message.into();
         match self.findings.iter_mut().find(|finding| finding.message == message) {
-            Some(finding) => finding.count += count,
+            Some(finding) => {
+                finding.count += count;
+                if message.reason.names_files() && finding.count <= MAX_NAMED_FILES {
+                    finding.example = format!("{}, {}", finding.example, example());
+                }
+            }
             None if count > 0 => self.findings.push(Finding { message, count, example: example() }),
             None => {}
         }

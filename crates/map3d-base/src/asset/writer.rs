@@ -1,6 +1,6 @@
 //! Writes an asset folder batch by batch, in bounded memory: each section grows in a file of its own, and `finish` joins them.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File};
 use std::hash::Hasher;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
@@ -49,6 +49,8 @@ pub struct AssetWriter {
     bounds: Box3,
     limits: GeometryLimits,
     textures: HashMap<String, String>,
+    /// Names of images in the document, by key.
+    image_names: BTreeMap<String, String>,
 }
 
 impl AssetWriter {
@@ -66,6 +68,7 @@ impl AssetWriter {
             bounds: Box3::EMPTY,
             limits: GeometryLimits::default(),
             textures: HashMap::new(),
+            image_names: BTreeMap::new(),
         })
     }
 
@@ -124,6 +127,11 @@ impl AssetWriter {
         Ok(key)
     }
 
+    /// Notes the name that the document has for an image, for messages.
+    pub fn name_image(&mut self, key: &str, name: &str) {
+        self.image_names.entry(key.to_owned()).or_insert_with(|| name.to_owned());
+    }
+
     /// Joins the sections and writes the tables; returns `report` with the counts of kept and skipped geometry.
     pub fn finish(mut self, materials: &Materials, objects: &[Object], mut report: AssetReport) -> Result<AssetReport> {
         self.join()?;
@@ -131,6 +139,9 @@ impl AssetWriter {
         let lines: Vec<String> = objects.iter().map(|o| serde_json::to_string(o).expect("objects are plain data")).collect();
         let text = if lines.is_empty() { String::new() } else { lines.join("\n") + "\n" };
         self.write("objects.jsonl", text.as_bytes())?;
+        if !self.image_names.is_empty() {
+            self.write_json("images.json", &self.image_names)?;
+        }
         for (reason, count) in self.skipped.reasons() {
             report.add(reason, count, String::new);
         }

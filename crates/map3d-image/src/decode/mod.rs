@@ -1,6 +1,8 @@
 //! Decodes source images to sRGB bytes. Checks sizes in the header before decoding; a damaged image is an error, never a panic.
 
+pub mod check;
 mod jpeg;
+mod jpeg_markers;
 
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,6 +12,7 @@ use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use map3d_base::limits::{MAX_IMAGE_PX, MAX_IMAGE_SIDE_PX};
 use map3d_base::{Error, Result};
 
+use self::jpeg_markers::{JpegColor, JpegHeader, JpegStructure, find_structure};
 use crate::raster::Raster;
 
 /// Limits of one image; the defaults are the specification's.
@@ -28,8 +31,12 @@ impl Default for ImageLimits {
 
 /// Returns width and height as the header states them. `path` is for messages.
 pub fn probe(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<(u32, u32)> {
-    let (width, height) = guarded(path, || if jpeg::is_jpeg(bytes) { jpeg::size(path, bytes) } else { other_size(path, bytes) })?;
-    check(path, width, height, limits)?;
+    let size = || match jpeg::is_jpeg(bytes) {
+        true => jpeg::header(path, bytes).map(|header| (header.width, header.height)),
+        false => other_size(path, bytes),
+    };
+    let (width, height) = guarded(path, size)?;
+    check_limits(path, width, height, limits)?;
     Ok((width, height))
 }
 
@@ -42,7 +49,7 @@ pub fn decode(path: &Path, bytes: &[u8], limits: &ImageLimits) -> Result<Raster>
 pub fn decode_reusing(path: &Path, bytes: &[u8], limits: &ImageLimits, spare: Vec<[u8; 4]>) -> Result<Raster> {
     let (width, height) = probe(path, bytes, limits)?;
     let raster = guarded(path, || match jpeg::is_jpeg(bytes) {
-        true => jpeg::decode(path, bytes, (width, height), spare),
+        true => jpeg::decode(path, bytes, &jpeg::header(path, bytes)?, spare),
         false => decode_other(path, bytes, limits),
     })?;
     if (raster.width, raster.height) != (width, height) {
@@ -51,7 +58,13 @@ pub fn decode_reusing(path: &Path, bytes: &[u8], limits: &ImageLimits, spare: Ve
     Ok(raster)
 }
 
-fn check(path: &Path, width: u32, height: u32, limits: &ImageLimits) -> Result<()> {
+/// Returns a number that is part of the keys of textures whose pixels an earlier version of map3d read differently; 0 for all others.
+pub fn reading_version(bytes: &[u8]) -> u8 {
+    let is_new_color = || JpegHeader::parse(bytes).is_some_and(|header| matches!(header.color(), JpegColor::Rgb | JpegColor::Inks));
+    u8::from(jpeg::is_jpeg(bytes) && (is_new_color() || find_structure(bytes) != JpegStructure::Whole))
+}
+
+fn check_limits(path: &Path, width: u32, height: u32, limits: &ImageLimits) -> Result<()> {
     let pixels = u64::from(width) * u64::from(height);
     let rows = [
         ("image side in px", u64::from(width.max(height)), "max_image_side_px", limits.max_image_side_px),

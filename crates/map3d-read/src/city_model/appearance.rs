@@ -8,6 +8,7 @@ use map3d_base::asset::Wrap;
 use super::crs_table::HorizontalKey;
 use super::geo_transform::GeoTransform;
 use super::ids::{self, Id, IdMap};
+use super::theme_selection::ThemeSelection;
 use crate::document::transparency::TransparencyCounts;
 
 /// The type of a surface data element and its properties.
@@ -42,6 +43,16 @@ pub enum TexturePlacement {
     Georeferenced(GeoTransform),
     /// A world file next to the image.
     WorldFile,
+}
+
+impl SurfaceDataKind {
+    /// Describes surface data in the report: the image of a texture, else the type.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Texture(texture) => texture.image.clone(),
+            Self::X3DMaterial { .. } | Self::Unsupported => "X3DMaterial".into(),
+        }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -91,6 +102,8 @@ pub enum Parameterization {
     /// Index into `matrices`.
     TexCoordGen(u32),
     TexCoordList(TexCoordRange),
+    /// The list is for this polygon alone, which has one ring: of a single ring in the list, the name does not matter.
+    OwnTexCoordList(TexCoordRange),
     /// A parameterization defined elsewhere in the document.
     XLink(Id),
 }
@@ -116,6 +129,8 @@ pub struct TargetBinding {
 struct BindingList {
     first: u32,
     last: u32,
+    /// The document has the target, or it is looked for elsewhere.
+    is_found: bool,
 }
 
 /// Texture coordinates of a ring: a range of `uvs`.
@@ -182,11 +197,30 @@ impl Appearances {
     pub fn bind(&mut self, target: Id, surface_data: u32, parameterization: Parameterization) {
         let number = self.bindings.len() as u32;
         self.bindings.push(TargetBinding { surface_data, parameterization, next: NO_BINDING });
-        let list = self.targets.entry(target).or_insert(BindingList { first: number, last: number });
+        let list = self.targets.entry(target).or_insert(BindingList { first: number, last: number, is_found: false });
         if list.last != number {
             self.bindings[list.last as usize].next = number;
             list.last = number;
         }
+    }
+
+    pub fn has_target(&self, id: Id) -> bool {
+        self.targets.contains_key(&id)
+    }
+
+    /// Notes that the document has a target, or that it is looked for elsewhere.
+    pub fn mark_found(&mut self, target: Id) {
+        if let Some(list) = self.targets.get_mut(&target) {
+            list.is_found = true;
+        }
+    }
+
+    /// Returns the surface data of each target of the selected theme that was not found, sorted by their order in the document.
+    pub fn surface_data_without_target(&self) -> Vec<&SurfaceData> {
+        let missing = self.targets.iter().filter(|(_, list)| !list.is_found);
+        let mut numbers: Vec<u32> = missing.filter_map(|(id, _)| self.theme_bindings(*id).next()).map(|binding| binding.surface_data).collect();
+        numbers.sort_unstable();
+        numbers.into_iter().map(|number| &self.surface_data[number as usize]).collect()
     }
 
     /// Makes a parameterization available to XLinks; the first with an id wins.
@@ -225,14 +259,18 @@ impl Appearances {
         }
     }
 
-    /// Counts the textures of each pending appearance for its theme.
-    pub fn count_textures(&self, theme: &mut ThemeSelection) {
-        let is_texture = |data: &SurfaceData| matches!(data.kind, SurfaceDataKind::Texture(_));
+    /// Counts the textures and materials of each pending appearance for its theme.
+    pub fn count_themes(&self, theme: &mut ThemeSelection) {
         for pending in &self.pending {
-            let own = self.surface_data[pending.surface_data.clone()].iter().filter(|d| is_texture(d)).count();
-            let linked = pending.xlinks.iter().filter_map(|id| self.surface_data_by_id.get(id));
-            let linked = linked.filter(|number| is_texture(&self.surface_data[**number as usize])).count();
-            theme.count_textures(&pending.theme, (own + linked) as u64);
+            theme.register(&pending.theme);
+            let linked = pending.xlinks.iter().filter_map(|id| self.surface_data_by_id.get(id)).map(|number| &self.surface_data[*number as usize]);
+            for data in self.surface_data[pending.surface_data.clone()].iter().chain(linked) {
+                match &data.kind {
+                    SurfaceDataKind::Texture(texture) => theme.count_image(&texture.image),
+                    SurfaceDataKind::X3DMaterial { .. } => theme.count_material(),
+                    SurfaceDataKind::Unsupported => {}
+                }
+            }
         }
     }
 
@@ -278,74 +316,16 @@ impl Appearances {
         Some(&self.uvs[found.start as usize..(found.start + found.count) as usize])
     }
 
+    /// Returns the texture coordinates of a TexCoordList with a single ring.
+    pub fn find_only_ring_uvs(&self, range: TexCoordRange) -> Option<&[[f32; 2]]> {
+        let [ring] = &self.rings[range.first as usize..(range.first + range.count) as usize] else { return None };
+        Some(&self.uvs[ring.start as usize..(ring.start + ring.count) as usize])
+    }
+
     /// Projects a point to (s, t) with a worldToTexture matrix.
     pub fn project(&self, matrix: u32, p: Vec3) -> [f64; 2] {
         let m = &self.matrices[matrix as usize];
         let row = |k: usize| m[4 * k] * p[0] + m[4 * k + 1] * p[1] + m[4 * k + 2] * p[2] + m[4 * k + 3];
         [row(0) / row(2), row(1) / row(2)]
-    }
-}
-
-/// Selects the appearance theme: the requested one or, by default, the one with the most textures; of equal ones, the first in the file.
-#[derive(Clone, Debug, Default)]
-pub struct ThemeSelection {
-    pub requested: Option<String>,
-    /// Themes in document order, with their numbers of textures.
-    themes: Vec<(String, u64)>,
-    /// Index into `themes` of the default.
-    default: usize,
-    is_chosen: bool,
-    /// Index of the theme registered last.
-    current: usize,
-}
-
-impl ThemeSelection {
-    pub fn new(requested: Option<String>) -> Self {
-        Self { requested, ..Self::default() }
-    }
-
-    /// Registers a theme. Must be called for all themes in document order.
-    pub fn register(&mut self, name: &str) {
-        self.current = self.themes.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
-            self.themes.push((name.to_owned(), 0));
-            self.themes.len() - 1
-        });
-    }
-
-    pub fn count_textures(&mut self, name: &str, count: u64) {
-        self.register(name);
-        self.themes[self.current].1 += count;
-    }
-
-    /// Counts a texture of the theme registered last.
-    pub fn count_texture_of_current(&mut self) {
-        if let Some((_, count)) = self.themes.get_mut(self.current) {
-            *count += 1;
-        }
-    }
-
-    /// Chooses the default theme; all textures are counted.
-    pub fn choose(&mut self) {
-        let most = self.themes.iter().map(|(_, count)| *count).max();
-        self.default = self.themes.iter().position(|(_, count)| Some(*count) == most).unwrap_or(0);
-        self.is_chosen = true;
-    }
-
-    pub fn is_chosen(&self) -> bool {
-        self.is_chosen
-    }
-
-    /// Returns the themes of the file, in document order.
-    pub fn names(&self) -> Vec<&str> {
-        self.themes.iter().map(|(name, _)| name.as_str()).collect()
-    }
-
-    /// The file has more than one theme.
-    pub fn has_several(&self) -> bool {
-        self.themes.len() > 1
-    }
-
-    pub fn selected(&self) -> Option<&str> {
-        self.requested.as_deref().or_else(|| self.themes.get(self.default).map(|(name, _)| name.as_str()))
     }
 }

@@ -20,6 +20,9 @@ const NUMERIC_PROPERTIES: [&str; 9] = [
     "averageHeight",
 ];
 
+/// Symbols, names and EPSG code of the metre, and symbols of the square and the cubic metre.
+const METRIC: [&str; 11] = ["m", "metre", "meter", "metres", "meters", "9001", "m2", "m²", "m3", "m³", "sqm"];
+
 /// Largest list of values of a repeated property.
 const MAX_LIST_BYTES: usize = 4096;
 
@@ -46,6 +49,21 @@ pub fn add_attribute(attributes: &mut Attributes, name: &str, value: Value) {
 pub fn add_code(attributes: &mut Attributes, name: &str, label: String, code: &str) {
     add_attribute(attributes, name, Value::String(label));
     add_attribute(attributes, &format!("{name}/code"), Value::from(code));
+}
+
+/// Adds the unit of a measure as `name/unit`, unless it is metres, square or cubic metres. `unit`: as written, a symbol or the address of a definition.
+pub fn add_unit(attributes: &mut Attributes, name: &str, unit: Option<&str>) {
+    let unit = unit.unwrap_or_default().trim();
+    // The last part of an address is the symbol, which may have a slash itself: kWh/a.
+    let symbol = match unit {
+        _ if unit.contains("://") => unit.rsplit(['#', '/']).next(),
+        _ if unit.starts_with("urn:") => unit.rsplit(':').next(),
+        _ => unit.strip_prefix('#').or(Some(unit)),
+    };
+    let symbol = symbol.unwrap_or_default();
+    if !symbol.is_empty() && !METRIC.contains(&symbol.to_ascii_lowercase().as_str()) {
+        add_attribute(attributes, &format!("{name}/unit"), Value::from(symbol));
+    }
 }
 
 fn format_value(value: &Value) -> String {
@@ -119,6 +137,28 @@ mod tests {
             ("measuredHeight", "NaN", Value::from("NaN")),
         ] {
             assert_eq!(parse_property(name, false, text), expected, "{name}");
+        }
+    }
+
+    #[test]
+    fn units_other_than_metres_stay_with_their_measure() {
+        for (unit, expected) in [
+            (None, None),
+            (Some("m"), None),
+            (Some("#m"), None),
+            (Some("urn:adv:uom:m"), None),
+            (Some("urn:ogc:def:uom:EPSG::9001"), None),
+            (Some(""), None),
+            (Some("ft"), Some("ft")),
+            (Some("urn:ogc:def:uom:UCUM::[ft_i]"), Some("[ft_i]")),
+            (Some("http://www.opengis.net/def/uom/UCUM/0/m2"), None),
+            (Some("#m2"), None),
+            (Some("http://www.opengis.net/def/uom/UCUM/0/deg"), Some("deg")),
+            (Some("kWh/a"), Some("kWh/a")),
+        ] {
+            let mut attributes = Attributes::from([("height".into(), Value::from(30))]);
+            add_unit(&mut attributes, "height", unit);
+            assert_eq!(attributes.get("height/unit").and_then(Value::as_str), expected, "{unit:?}");
         }
     }
 

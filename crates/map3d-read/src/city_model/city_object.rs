@@ -9,6 +9,7 @@ use super::feature_types::FeatureKind;
 use super::geometry_arena::{GeometryArena, GeometryNode, NodeId, NodeKind};
 use super::ids::{Id, IdMap};
 use super::implicit_geometry::ImplicitGeometry;
+use super::lifespan::Lifespan;
 use crate::document::ReliefGrid;
 
 /// A geometry property of a feature.
@@ -42,6 +43,9 @@ pub struct Feature {
     pub rank: Rank,
     /// Inside a building; converted only on request, or if a feature outside refers to it.
     pub is_interior: bool,
+    pub lifespan: Lifespan,
+    /// Does not exist at the date of the conversion.
+    pub is_left_out: bool,
     /// Coordinate system of geometry that names none: that of the nearest envelope.
     pub crs: CrsNumber,
     /// Content of a `lod` property of this feature or its parent (relief).

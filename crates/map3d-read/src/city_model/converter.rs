@@ -12,6 +12,7 @@ use super::feature_types::to_class_name;
 use super::geometry_arena::{GeometryArena, NodeId};
 use super::ids::{self, Id, IdSet};
 use super::implicit_geometry::PrototypeSource;
+use super::lifespan::VersionDate;
 use super::lod_selection::{representations_at, select_lods};
 use super::material_resolver::MaterialResolver;
 use super::own_appearance::add_own_appearances;
@@ -35,6 +36,8 @@ pub struct Conversion {
     pub lod: Option<u8>,
     /// Rooms and what is in them are converted.
     pub interiors: bool,
+    /// Date of the versions of features that are converted.
+    pub date: VersionDate,
     /// The document's transparency is opacity.
     pub inverted: bool,
     /// Formats of the files that the document may name.
@@ -114,7 +117,9 @@ impl FeatureConverter {
             return Ok(());
         }
         city_object.appearances.resolve_theme_xlinks();
+        self.find_targets(city_object, report)?;
         add_own_appearances(&mut city_object.geometry, &mut city_object.appearances);
+        self.leave_out_versions(city_object, report);
         city_object.extend_interiors();
         city_object.expose_shared_interiors();
         let lods = select_lods(city_object, self.conversion.lod);
@@ -145,13 +150,50 @@ impl FeatureConverter {
         Ok(())
     }
 
+    /// Leaves out features that do not exist at the date of the conversion. Their geometry stays for features that refer to it.
+    fn leave_out_versions(&self, city_object: &mut CityObject, report: &mut ReportBuilder) {
+        for f in 0..city_object.features.len() {
+            let feature = &city_object.features[f];
+            let is_within = feature.parent.is_some_and(|p| city_object.features[p as usize].is_left_out);
+            let exists = feature.lifespan.exists(self.conversion.date);
+            if !exists && !is_within {
+                let object = &city_object.features[city_object.find_object(f as u32) as usize];
+                report.omit_one(self.conversion.date.reason(), &object.name);
+            }
+            if !exists || is_within {
+                let feature = &mut city_object.features[f];
+                feature.is_left_out = true;
+                feature.representations.clear();
+            }
+        }
+    }
+
+    /// Notes which targets of appearances the city object has. Reports those of its own appearances that it lacks.
+    fn find_targets(&mut self, city_object: &mut CityObject, report: &mut ReportBuilder) -> Result<()> {
+        let CityObject { features, geometry, appearances, .. } = city_object;
+        if appearances.is_empty() && self.document_appearances.is_empty() {
+            return Ok(());
+        }
+        let ids = features.iter().map(|f| f.id).chain(geometry.nodes.iter().map(|n| n.id)).chain(geometry.rings.iter().map(|r| r.id));
+        for id in ids.filter(|id| *id != ids::NONE) {
+            self.document_appearances.mark_found(id);
+            appearances.mark_found(id);
+        }
+        report_targets(appearances, report)
+    }
+
+    /// Reports the targets of appearances outside city objects that no city object has.
+    pub fn report_missing_targets(&self, report: &mut ReportBuilder) -> Result<()> {
+        report_targets(&self.document_appearances, report)
+    }
+
     /// Adds the objects and parts of a city object to the asset; returns their indices by feature.
     fn add_objects(&mut self, city_object: &mut CityObject, lods: &[Option<u8>]) -> Vec<u32> {
         let mut numbers = vec![u32::MAX; city_object.features.len()];
         for f in 0..city_object.features.len() {
             let feature = &city_object.features[f];
             let parent = feature.parent.map(|p| numbers[city_object.find_object(p) as usize]);
-            if !feature.is_object() {
+            if !feature.is_object() || feature.is_left_out {
                 continue;
             }
             numbers[f] = self.objects.len() as u32;
@@ -160,7 +202,7 @@ impl FeatureConverter {
             let class = to_class_name(&feature.type_name);
             let name = if feature.name.is_empty() { format!("{class}-{}", numbers[f] + 1) } else { std::mem::take(&mut feature.name) };
             let attributes = std::mem::take(&mut feature.attributes);
-            self.objects.push(Object { name, class, parent, lod, attributes });
+            self.objects.push(Object { name, class, parent, lod, attributes, without_height: false });
         }
         numbers
     }
@@ -249,6 +291,9 @@ impl FeatureConverter {
             self.tessellate_shared(&collected.polygons, link.object, link.rank, report)?;
         }
         self.complete_batch(1);
+        for object in self.tessellator.objects_without_height() {
+            self.objects[object].without_height = true;
+        }
         Ok(())
     }
 
@@ -365,6 +410,11 @@ impl FeatureConverter {
         }
         Ok(instances)
     }
+}
+
+fn report_targets(appearances: &Appearances, report: &mut ReportBuilder) -> Result<()> {
+    let missing = appearances.surface_data_without_target();
+    missing.into_iter().try_for_each(|data| report.warn(Reason::AppearanceTargetMissing, data.kind.describe()))
 }
 
 /// Counts the polygons of interiors that are not converted as part of a feature outside.

@@ -33,6 +33,8 @@ pub struct GeometryNode {
     pub reversed: bool,
     /// Coordinate system of a polygon.
     pub crs: CrsNumber,
+    /// Positions of a polygon have no heights.
+    pub is_flat: bool,
 }
 
 /// A ring as written: range of `points`; the first and last points are usually equal.
@@ -81,7 +83,7 @@ impl GeometryArena {
     pub fn add(&mut self, id: Id, parent: NodeId, kind: NodeKind) -> NodeId {
         let number = self.nodes.len() as NodeId;
         let (first_child, last_child, next_sibling) = (NO_NODE, NO_NODE, NO_NODE);
-        self.nodes.push(GeometryNode { id, parent, first_child, last_child, next_sibling, kind, reversed: false, crs: DOCUMENT_CRS });
+        self.nodes.push(GeometryNode { id, parent, first_child, last_child, next_sibling, kind, reversed: false, crs: DOCUMENT_CRS, is_flat: false });
         if id != ids::NONE {
             self.by_id.entry(id).or_insert(number);
         }

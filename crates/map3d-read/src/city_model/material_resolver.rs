@@ -51,6 +51,8 @@ enum Fit {
 #[derive(Clone, Copy)]
 pub struct RingPoints<'a> {
     pub id: Id,
+    /// Id of the polygon.
+    pub polygon: Id,
     pub points: &'a [Vec3],
     /// Coordinate system of the points, if it has a name.
     pub crs: Option<HorizontalKey>,
@@ -100,11 +102,18 @@ impl MaterialResolver {
             for appearances in sources.iter_mut().filter(|a| !a.is_empty()) {
                 let is_side = |b: &TargetBinding| appearances.surface_data[b.surface_data as usize].is_front == is_front;
                 let bindings: Vec<TargetBinding> = appearances.theme_bindings(*id).filter(is_side).collect();
+                let is_own = matches!(rings, [ring] if *id == ring.id || *id == ring.polygon);
                 for binding in bindings {
                     let Some(surface_data) = self.resolve_surface_data(appearances, binding.surface_data, report)? else { continue };
                     if !surface_data.material.textured {
                         untextured.get_or_insert(surface_data.material);
-                    } else if self.compute_uvs(appearances, binding.parameterization, &surface_data, rings, uvs, report)? {
+                        continue;
+                    }
+                    let parameterization = match binding.parameterization {
+                        Parameterization::TexCoordList(range) if is_own => Parameterization::OwnTexCoordList(range),
+                        other => other,
+                    };
+                    if self.compute_uvs(appearances, parameterization, &surface_data, rings, uvs, report)? {
                         return Ok(Some(surface_data.material));
                     }
                 }
@@ -245,7 +254,8 @@ impl MaterialResolver {
                 uvs.extend(points().map(|p| appearances.project(matrix, *p)));
                 Ok(true)
             }
-            Parameterization::TexCoordList(range) => copy_listed_uvs(appearances, range, rings, uvs, report),
+            Parameterization::TexCoordList(range) => copy_listed_uvs(appearances, range, false, rings, uvs, report),
+            Parameterization::OwnTexCoordList(range) => copy_listed_uvs(appearances, range, true, rings, uvs, report),
             Parameterization::None | Parameterization::XLink(_) => {
                 report.warn(Reason::TextureWithoutParameterization, String::new())?;
                 Ok(false)
@@ -296,12 +306,14 @@ fn check_place(is_other: bool, uvs: &[[f64; 2]], report: &mut ReportBuilder) -> 
 fn copy_listed_uvs(
     appearances: &Appearances,
     range: TexCoordRange,
+    is_own: bool,
     rings: &[RingPoints],
     uvs: &mut Vec<[f64; 2]>,
     report: &mut ReportBuilder,
 ) -> Result<bool> {
     for (k, ring) in rings.iter().enumerate() {
-        let Some(found) = appearances.find_ring_uvs(range, ring.id) else {
+        let only = || appearances.find_only_ring_uvs(range).filter(|uvs| is_own && matches!(ring.points.len().wrapping_sub(uvs.len()), 0 | 1));
+        let Some(found) = appearances.find_ring_uvs(range, ring.id).or_else(only) else {
             // The list belongs to other polygons of the target, or lacks one of the interior rings.
             if k > 0 {
                 report.warn(Reason::TextureCoordinatesMissingForHole, String::new())?;

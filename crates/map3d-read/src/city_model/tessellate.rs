@@ -63,6 +63,8 @@ pub struct Tessellator {
     options: ReadOptions,
     /// Number of triangles of the whole document.
     triangles: u64,
+    /// Per object: whether polygons with and without heights were drawn.
+    has_heights: Vec<[bool; 2]>,
     points: Vec<Vec3>,
     uvs: Vec<[f64; 2]>,
     /// Texture coordinates of the rings as written, before repeated points are dropped.
@@ -81,6 +83,7 @@ impl Tessellator {
             is_prototype: false,
             options,
             triangles: 0,
+            has_heights: Vec::new(),
             points: Vec::new(),
             uvs: Vec::new(),
             source_uvs: Vec::new(),
@@ -114,6 +117,19 @@ impl Tessellator {
         self.open.pop().map(OpenBatch::finish).unwrap_or_default()
     }
 
+    /// Returns the objects whose polygons all have no heights.
+    pub fn objects_without_height(&self) -> impl Iterator<Item = usize> + '_ {
+        self.has_heights.iter().enumerate().filter(|(_, has)| **has == [false, true]).map(|(object, _)| object)
+    }
+
+    fn note_heights(&mut self, object: u32, is_flat: bool) {
+        let object = object as usize;
+        if self.has_heights.len() <= object {
+            self.has_heights.resize(object + 1, [false; 2]);
+        }
+        self.has_heights[object][usize::from(is_flat)] = true;
+    }
+
     /// Tessellates a polygon, or skips and counts it.
     pub fn add_polygon(
         &mut self,
@@ -126,7 +142,8 @@ impl Tessellator {
         let arena = geometry.geometry;
         let rings = arena.polygon_rings(arena.node(polygon.node).kind).iter();
         let key = self.keys.get(arena.node(polygon.node).crs as usize).copied().flatten().filter(|_| !self.is_prototype);
-        let rings: Vec<RingPoints> = rings.map(|r| RingPoints { id: r.id, points: arena.ring_points(r), crs: key }).collect();
+        let polygon_id = arena.node(polygon.node).id;
+        let rings: Vec<RingPoints> = rings.map(|r| RingPoints { id: r.id, polygon: polygon_id, points: arena.ring_points(r), crs: key }).collect();
         let material = self.resolve_material(geometry, polygon.node, &rings, surface, sources, report)?;
         if material.invisible {
             report.omit(Reason::PolygonTransparent, 1);
@@ -143,6 +160,11 @@ impl Tessellator {
             Ok(Coverage::Inexact) => report.warn(Reason::RingsCross, surface.object_name)?,
             Ok(Coverage::Exact) => {}
         }
+        let is_flat = arena.node(polygon.node).is_flat;
+        if is_flat {
+            report.warn(Reason::PolygonWithoutHeight, surface.object_name)?;
+        }
+        self.note_heights(surface.object, is_flat);
         self.push_triangles(crs, polygon.reversed, surface, material);
         report.check_limit(LimitCheck::triangles(self.triangles, self.options.max_triangles))
     }
@@ -158,7 +180,14 @@ impl Tessellator {
     ) -> Result<ResolvedMaterial> {
         let MaterialSources { resolver, appearances } = sources;
         let mut material = None;
-        if appearances.iter().any(|a| !a.is_empty()) {
+        let ring = rings.first().map_or(ids::NONE, |ring| ring.id);
+        if ring != ids::NONE && appearances.iter().any(|a| a.has_target(ring)) {
+            material = resolver.resolve(&[ring], rings, appearances, &mut self.source_uvs, report)?;
+            if material.is_some() {
+                report.note(Reason::AppearanceTargetIsRing, surface.object_name);
+            }
+        }
+        if material.is_none() && appearances.iter().any(|a| !a.is_empty()) {
             self.target_ids.clear();
             geometry.append_target_ids(node, &mut self.target_ids);
             self.target_ids.extend(surface.feature_ids.iter().filter(|id| **id != ids::NONE));

@@ -6,8 +6,13 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use map3d_base::{Error, Reason, Result};
+use unicode_normalization::UnicodeNormalization;
+
+use super::text_input::decode_name;
 
 const MAX_NAME_BYTES: usize = 1024;
+/// Most parts of an absolute path that are searched below the folder.
+const MAX_TAIL_PARTS: usize = 16;
 
 /// The reason why a name does not resolve to a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,6 +99,11 @@ impl AssetFolder {
             Some(p) if !p.as_os_str().is_empty() => p,
             _ => Path::new("."),
         };
+        Self::new(base, root)
+    }
+
+    /// `base`: the folder to which names are relative; `root`: the folder that they may lead into, by default `base`.
+    pub fn new(base: &Path, root: Option<&Path>) -> Result<Self> {
         let base = fs::canonicalize(base).map_err(|e| Error::storage(base, e))?;
         let root = match root {
             Some(root) => fs::canonicalize(root).map_err(|e| Error::storage(root, e))?,
@@ -102,16 +112,17 @@ impl AssetFolder {
         Ok(Self { root, base, listings: HashMap::new() })
     }
 
-    /// Finds the file that a name in the document refers to. Accepts backslashes, percent-encoding and differences in case.
+    /// Finds the file that a name in the document refers to. Accepts quotes, backslashes, percent-encoding, differences in case and in Unicode
+    /// normalization, and the absolute paths of another computer if the file lies below the folder.
     pub fn find(&mut self, name: &str) -> std::result::Result<LocatedFile, FileError> {
-        let name = name.trim();
+        let name = unquote(name.trim());
         if name.is_empty() || name.len() > MAX_NAME_BYTES || name.contains('\0') {
             return Err(FileError::InvalidName);
         }
-        let name = strip_file_scheme(name)?;
-        let slashed = name.replace('\\', "/");
+        let WrittenName { path, is_absolute } = parse_name(name)?;
+        let slashed = path.replace('\\', "/");
         let decoded = decode_percent(&slashed);
-        let spellings = [(name, None), (&slashed, Some(Reason::FileNameBackslashes)), (&decoded, Some(Reason::FileNamePercentEncoded))];
+        let spellings = [(path, None), (&slashed, Some(Reason::FileNameBackslashes)), (&decoded, Some(Reason::FileNamePercentEncoded))];
         let mut error = FileError::NotFound;
         for (spelling, note) in spellings {
             match self.canonicalize_inside(&self.base.join(spelling)) {
@@ -120,11 +131,30 @@ impl AssetFolder {
                 Err(other) => error = other,
             }
         }
+        if is_absolute {
+            let path = self.find_tail(&slashed).or_else(|| self.find_tail(&decoded)).ok_or(FileError::OutsideFolder)?;
+            return Ok(LocatedFile { path, note: Some(Reason::FileNameAbsolute) });
+        }
         if error != FileError::NotFound {
             return Err(error);
         }
-        let path = self.find_ignoring_case(&slashed).or_else(|| self.find_ignoring_case(&decoded)).ok_or(FileError::NotFound)?;
-        Ok(LocatedFile { path: self.canonicalize_inside(&path)?, note: Some(Reason::FileNameCaseDiffers) })
+        let base = self.base.clone();
+        let found = self.find_ignoring_case(&base, &slashed).map(|path| (path, &slashed));
+        let (path, written) = found.or_else(|| Some((self.find_ignoring_case(&base, &decoded)?, &decoded))).ok_or(FileError::NotFound)?;
+        let note = if ends_in(&path, written) { None } else { Some(Reason::FileNameCaseDiffers) };
+        Ok(LocatedFile { path: self.canonicalize_inside(&path)?, note })
+    }
+
+    /// Finds the last parts of an absolute path, as many as possible, below the folder of the document or below the root.
+    fn find_tail(&mut self, name: &str) -> Option<PathBuf> {
+        let parts: Vec<&str> = name.split('/').filter(|part| !matches!(*part, "" | ".")).collect();
+        let tails = (parts.len().saturating_sub(MAX_TAIL_PARTS)..parts.len()).map(|first| parts[first..].join("/"));
+        let bases = if self.base == self.root { vec![self.base.clone()] } else { vec![self.base.clone(), self.root.clone()] };
+        let places: Vec<(PathBuf, String)> = tails.flat_map(|tail| bases.iter().map(move |base| (base.clone(), tail.clone()))).collect();
+        places.into_iter().find_map(|(base, tail)| {
+            let path = self.find_ignoring_case(&base, &tail)?;
+            self.canonicalize_inside(&path).ok()
+        })
     }
 
     /// Returns true for a canonical path of a regular file under the root.
@@ -158,9 +188,9 @@ impl AssetFolder {
         !normalized.starts_with(&self.root)
     }
 
-    /// Follows a relative path component by component, ignoring case.
-    fn find_ignoring_case(&mut self, name: &str) -> Option<PathBuf> {
-        let mut path = self.base.clone();
+    /// Follows a relative path component by component, ignoring case and Unicode normalization.
+    fn find_ignoring_case(&mut self, base: &Path, name: &str) -> Option<PathBuf> {
+        let mut path = base.to_path_buf();
         for component in Path::new(name).components() {
             match component {
                 Component::Normal(word) => {
@@ -182,29 +212,57 @@ impl AssetFolder {
 
     fn find_entry(&mut self, folder: &Path, name: &str) -> Option<OsString> {
         let listing = self.listings.entry(folder.to_path_buf()).or_insert_with(|| list_folder(folder));
-        listing.get(&name.to_lowercase()).cloned()
+        listing.get(&fold(name)).cloned()
     }
 }
 
-/// Maps lower-case names to names on disk. Of names that differ only in case, the first in byte order wins.
+/// Maps folded names to names on disk. Of names that fold to the same, the first in byte order wins.
 fn list_folder(folder: &Path) -> HashMap<String, OsString> {
     let Ok(entries) = fs::read_dir(folder) else { return HashMap::new() };
     let mut names: Vec<OsString> = entries.filter_map(|e| Some(e.ok()?.file_name())).collect();
     names.sort_unstable_by(|a, b| b.cmp(a));
-    names.into_iter().map(|n| (n.to_string_lossy().to_lowercase(), n)).collect()
+    names.into_iter().map(|n| (fold(&decode_name(n.as_encoded_bytes())), n)).collect()
 }
 
-/// Removes `file:`; any other scheme is a URL. A single letter before the colon is a Windows drive.
-fn strip_file_scheme(name: &str) -> std::result::Result<&str, FileError> {
-    let Some((scheme, rest)) = name.split_once(':') else { return Ok(name) };
+/// Returns a name in lower case and composed (NFC): macOS writes names decomposed (NFD).
+fn fold(name: &str) -> String {
+    name.nfc().collect::<String>().to_lowercase()
+}
+
+/// Returns true if a path ends in a name, apart from Unicode normalization.
+fn ends_in(path: &Path, name: &str) -> bool {
+    let composed = |text: &str| text.nfc().collect::<String>();
+    composed(&decode_name(path.as_os_str().as_encoded_bytes())).ends_with(&composed(name.trim_start_matches("./")))
+}
+
+/// Removes the quotes around a name.
+fn unquote(name: &str) -> &str {
+    let inner = |quote: char| name.strip_prefix(quote)?.strip_suffix(quote).map(str::trim);
+    inner('"').or_else(|| inner('\'')).unwrap_or(name)
+}
+
+/// A name without its scheme.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct WrittenName<'a> {
+    path: &'a str,
+    /// It begins at the root of a file system, perhaps of another computer.
+    is_absolute: bool,
+}
+
+/// Removes `file:` and the letter of a Windows drive; any other scheme is a URL.
+fn parse_name(name: &str) -> std::result::Result<WrittenName<'_>, FileError> {
+    let begins_at_root = |path: &str| path.starts_with(['/', '\\']);
+    let Some((scheme, rest)) = name.split_once(':') else { return Ok(WrittenName { path: name, is_absolute: begins_at_root(name) }) };
     if scheme.eq_ignore_ascii_case("file") {
-        return Ok(rest.strip_prefix("//").unwrap_or(rest));
+        let path = rest.strip_prefix("//").unwrap_or(rest);
+        let is_absolute = rest.starts_with("//") || begins_at_root(rest) || path.as_bytes().get(1) == Some(&b':');
+        return Ok(WrittenName { path, is_absolute });
     }
     let is_scheme = scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
     match (is_scheme, scheme.len()) {
-        (true, 1) => Err(FileError::OutsideFolder),
+        (true, 1) => Ok(WrittenName { path: rest, is_absolute: true }),
         (true, 2..) if rest.starts_with("//") || scheme.eq_ignore_ascii_case("data") || scheme.eq_ignore_ascii_case("urn") => Err(FileError::Url),
-        _ => Ok(name),
+        _ => Ok(WrittenName { path: name, is_absolute: begins_at_root(name) }),
     }
 }
 

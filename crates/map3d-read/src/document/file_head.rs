@@ -29,6 +29,11 @@ impl FileHead {
         Ok(Self::new(read_file_head(path, HEAD_BYTES)?))
     }
 
+    /// Returns the text, without white space before it.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// Returns true for text that begins as XML does.
     pub fn is_xml(&self) -> bool {
         self.text.starts_with('<')

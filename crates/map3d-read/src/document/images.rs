@@ -1,14 +1,16 @@
 //! Images of a document: located, checked by their header, and identified by the hash of their bytes.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
-use std::fs::File;
-use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
-use std::path::PathBuf;
+use std::fs::{self, File};
+use std::io::{self, BufRead, BufReader, Cursor, Seek};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use imagesize::ImageType;
 use map3d_base::Result;
 use map3d_base::reason::{Message, Reason};
+use map3d_image::decode::check::{ImageFault, find_fault};
 use sha2::{Digest, Sha256};
 
 use super::asset_folder::{AssetFolder, IMAGE};
@@ -32,6 +34,21 @@ impl ImageSource {
             Self::Bytes(bytes) => Box::new(Cursor::new(&**bytes)),
         })
     }
+
+    fn read(&self) -> io::Result<Cow<'_, [u8]>> {
+        match self {
+            Self::File(path) => fs::read(path).map(Cow::Owned),
+            Self::Bytes(bytes) => Ok(Cow::Borrowed(bytes)),
+        }
+    }
+
+    /// The path for messages.
+    fn path(&self) -> &Path {
+        match self {
+            Self::File(path) => path,
+            Self::Bytes(_) => Path::new("image in the document"),
+        }
+    }
 }
 
 /// An image to be copied into the asset.
@@ -46,6 +63,8 @@ pub struct DocumentImage {
     pub height_px: u32,
     /// True if any texel is not opaque. Detected for PNG only.
     pub transparent: bool,
+    /// Its name in the document; empty for an image in the document itself.
+    pub name: String,
 }
 
 /// All images of one document, each stored once.
@@ -85,7 +104,7 @@ impl DocumentImages {
             report.note(note, name);
         }
         match DocumentImage::inspect(ImageSource::File(file.path), options) {
-            Ok(image) => Ok(Some(self.add(image))),
+            Ok(image) => Ok(Some(self.add(DocumentImage { name: name.to_owned(), ..image }))),
             Err(reason) => {
                 report.warn(reason, name)?;
                 Ok(None)
@@ -103,28 +122,43 @@ impl DocumentImages {
 }
 
 impl DocumentImage {
-    /// Reads and checks the header, then hashes the bytes. The error is the reason for the report.
+    /// Checks the header, then whether the file is whole, and hashes the bytes. The error is the reason for the report.
     pub fn inspect(source: ImageSource, options: &ReadOptions) -> std::result::Result<Self, Message> {
-        let unreadable = |e: io::Error| Reason::ImageUnreadable.with("error", e.kind().to_string());
-        let mut input = source.open().map_err(unreadable)?;
-        let kind = imagesize::reader_type(&mut input).map_err(|_| Reason::ImageFormatUnknown)?;
-        let extension = extension_for(kind).ok_or(Reason::ImageFormatNotRead)?;
-        let size = kind.reader_size(&mut input).map_err(|_| Reason::ImageHeaderInvalid)?;
-        drop(input);
-        let (width, height) = (size.width as u64, size.height as u64);
-        if width == 0 || height == 0 {
-            return Err(Reason::ImageWithoutPixels.into());
+        let (extension, width, height) = check_header(&source, options)?;
+        let bytes = source.read().map_err(unreadable)?;
+        match find_fault(source.path(), &bytes) {
+            Some(ImageFault::Damaged) => return Err(Reason::ImageDamaged.into()),
+            Some(ImageFault::Kind(kind)) => return Err(Reason::ImageKindNotRead.with("kind", kind)),
+            None => {}
         }
-        if width.max(height) > options.max_image_side_px {
-            return Err(Reason::ImageSideOverLimit.with("limit", options.max_image_side_px));
-        }
-        if width * height > options.max_image_px {
-            return Err(Reason::ImagePixelsOverLimit.with("limit", options.max_image_px));
-        }
-        let key = compute_key(&source).map_err(unreadable)?;
-        let transparent = extension == "png" && is_png_transparent(&source);
-        Ok(Self { source, extension, key, width_px: width as u32, height_px: height as u32, transparent })
+        let key = Sha256::digest(&bytes).iter().take(16).map(|b| format!("{b:02x}")).collect();
+        let transparent = extension == "png" && is_png_transparent(&bytes);
+        drop(bytes);
+        Ok(Self { source, extension, key, width_px: width, height_px: height, transparent, name: String::new() })
     }
+}
+
+fn unreadable(e: io::Error) -> Message {
+    Reason::ImageUnreadable.with("error", e.kind().to_string())
+}
+
+/// Returns the file extension of the detected type, width and height.
+fn check_header(source: &ImageSource, options: &ReadOptions) -> std::result::Result<(&'static str, u32, u32), Message> {
+    let mut input = source.open().map_err(unreadable)?;
+    let kind = imagesize::reader_type(&mut input).map_err(|_| Reason::ImageFormatUnknown)?;
+    let extension = extension_for(kind).ok_or(Reason::ImageFormatNotRead)?;
+    let size = kind.reader_size(&mut input).map_err(|_| Reason::ImageHeaderInvalid)?;
+    let (width, height) = (size.width as u64, size.height as u64);
+    if width == 0 || height == 0 {
+        return Err(Reason::ImageWithoutPixels.into());
+    }
+    if width.max(height) > options.max_image_side_px {
+        return Err(Reason::ImageSideOverLimit.with("limit", options.max_image_side_px));
+    }
+    if width * height > options.max_image_px {
+        return Err(Reason::ImagePixelsOverLimit.with("limit", options.max_image_px));
+    }
+    Ok((extension, width as u32, height as u32))
 }
 
 fn extension_for(kind: ImageType) -> Option<&'static str> {
@@ -140,22 +174,9 @@ fn extension_for(kind: ImageType) -> Option<&'static str> {
     })
 }
 
-fn compute_key(source: &ImageSource) -> io::Result<String> {
-    let mut input = source.open()?;
-    let mut digest = Sha256::new();
-    let mut buffer = vec![0; 1 << 16];
-    loop {
-        match input.read(&mut buffer)? {
-            0 => return Ok(digest.finalize().iter().take(16).map(|b| format!("{b:02x}")).collect()),
-            n => digest.update(&buffer[..n]),
-        }
-    }
-}
-
 /// Returns true if any texel of a PNG is not opaque. Reads row by row. Treats a damaged image as opaque: the scene build reports it when it decodes it.
-fn is_png_transparent(source: &ImageSource) -> bool {
-    let Ok(input) = source.open() else { return false };
-    let mut decoder = png::Decoder::new(input);
+fn is_png_transparent(bytes: &[u8]) -> bool {
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::normalize_to_color8() | png::Transformations::ALPHA);
     let Ok(mut reader) = decoder.read_info() else { return false };
     let info = reader.info();

@@ -62,7 +62,7 @@ impl ReportBuilder {
     }
 
     /// Counts one valid part that is left out by design.
-    pub fn omit_one(&mut self, reason: Reason, example: &str) {
+    pub fn omit_one(&mut self, reason: impl Into<Message>, example: &str) {
         self.add(reason.into(), Severity::Omitted, 1, || example.to_owned()).expect("not a fault");
     }
 

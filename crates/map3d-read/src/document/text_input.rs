@@ -202,19 +202,23 @@ pub fn find_utf16(head: &[u8]) -> Option<&'static Encoding> {
     marked.or_else(|| detect_utf16_without_bom(head))
 }
 
-/// Detects UTF-16 by its zeros: text of mostly ASCII characters has one in every other byte.
+/// Detects UTF-16 by its zeros: an ASCII character has one in one of its two bytes, and other alphabets have few. XML shows by its first characters.
 fn detect_utf16_without_bom(head: &[u8]) -> Option<&'static Encoding> {
     let pairs = head.as_chunks::<2>().0;
-    let zeros = |k: usize| pairs.iter().filter(|p| p[k] == 0).count();
-    let most = pairs.len() * 3 / 4;
     if pairs.len() < 2 || Encoding::for_bom(head).is_some() {
-        None
-    } else if zeros(1) > most && zeros(0) == 0 {
-        Some(UTF_16LE)
-    } else if zeros(0) > most && zeros(1) == 0 {
-        Some(UTF_16BE)
-    } else {
-        None
+        return None;
+    }
+    let zeros = |k: usize| pairs.iter().filter(|p| p[k] == 0).count();
+    let begins_as_xml = |k: usize| {
+        let mut ascii = pairs.iter().map(|p| (p[k] == 0).then_some(p[1 - k])).skip_while(|c| c.is_some_and(|c| c.is_ascii_whitespace()));
+        ascii.next() == Some(Some(b'<')) && ascii.next().flatten().is_some_and(|c| c.is_ascii_graphic())
+    };
+    let is_mostly = |k: usize| zeros(k) >= 2 && zeros(k) * 4 > pairs.len() && zeros(1 - k) * 16 < zeros(k);
+    let has_high_zeros = |k: usize| begins_as_xml(k) || is_mostly(k);
+    match (has_high_zeros(1), has_high_zeros(0)) {
+        (true, false) => Some(UTF_16LE),
+        (false, true) => Some(UTF_16BE),
+        _ => None,
     }
 }
 

@@ -10,7 +10,10 @@ use super::images::{DocumentImage, ImageSource};
 
 /// Copies the images, writes the tables and closes the asset. Call it after the reader's last batch.
 pub fn write_tables(reader: &dyn DocumentReader, mut writer: AssetWriter) -> Result<AssetReport> {
-    for DocumentImage { source, extension, key, .. } in reader.textures() {
+    for DocumentImage { source, extension, key, name, .. } in reader.textures() {
+        if !name.is_empty() {
+            writer.name_image(key, name);
+        }
         match source {
             ImageSource::File(path) => {
                 let bytes = fs::read(path).map_err(|e| Error::storage(path, e))?;

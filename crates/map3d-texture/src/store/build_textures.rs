@@ -6,14 +6,16 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use map3d_base::asset::{AssetMesh, Material};
-use map3d_base::{Error, Result};
+use map3d_base::{Error, Reason, Result};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::store::file::{self, TextureFile, TextureKey, texture_key, texture_path};
 use crate::store::source;
 use crate::store::usage::mark_triangle;
 use map3d_image::ImageLimits;
 use map3d_image::PixelMask;
+use map3d_image::decode::decode;
 
 /// (stage, done, total) → false to stop.
 pub type Progress<'a> = dyn Fn(&str, u64, u64) -> bool + Sync + 'a;
@@ -47,12 +49,33 @@ pub struct MissingImages {
     pub example: String,
 }
 
+/// Why an image cannot be used: a code of spec/messages.json and the value that its text names.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TextureFault {
+    pub code: String,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub values: BTreeMap<String, String>,
+}
+
+impl TextureFault {
+    pub fn new(cause: &Error) -> Self {
+        let (reason, values) = match cause {
+            Error::Limit { value, .. } => (Reason::ImagePixelsOverLimit, BTreeMap::from([("limit".to_owned(), value.to_string())])),
+            Error::Storage { source, .. } => (Reason::ImageUnreadable, BTreeMap::from([("error".to_owned(), source.kind().to_string())])),
+            _ => (Reason::ImageDamaged, BTreeMap::new()),
+        };
+        Self { code: reason.code().to_owned(), values }
+    }
+}
+
 /// The textures of a scene. A source without a sound image is absent and counted in `missing`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TextureKeys {
     pub by_source: BTreeMap<TextureSource, TextureInfo>,
     /// By reason.
     pub missing: BTreeMap<String, MissingImages>,
+    /// Why images of `missing` cannot be used, by their keys in the assets.
+    pub faults: BTreeMap<String, TextureFault>,
     /// Files that existed already.
     pub kept: u64,
     pub written: u64,
@@ -233,6 +256,7 @@ impl<'a> TextureBuild<'a> {
         };
         let name = source.image.as_deref().or(source.alpha.as_deref()).unwrap_or_default();
         let mut result = self.result.lock().expect("no thread panicked");
+        result.faults.insert(name.to_owned(), TextureFault::new(cause));
         let entry = result.missing.entry(reason.to_owned()).or_default();
         entry.count += 1;
         let example = format!("{name}: {cause}");
@@ -298,4 +322,15 @@ fn read_image(folder: &Path, images: &HashMap<String, PathBuf>, key: Option<&str
         return Err(Error::format(path, "an empty file"));
     }
     Ok((path.clone(), bytes))
+}
+
+/// Decodes all images of an asset; returns those that cannot be used, by their keys.
+pub fn find_damaged_images(folder: &Path, threads: usize) -> Result<BTreeMap<String, TextureFault>> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| Error::argument(format!("threads: {e}")))?;
+    let images = image_files(folder)?;
+    let fault = |key: &String| {
+        let decoded = read_image(folder, &images, Some(key)).and_then(|(path, bytes)| decode(&path, &bytes, &ImageLimits::default()));
+        decoded.err().map(|cause| (key.clone(), TextureFault::new(&cause)))
+    };
+    Ok(pool.install(|| images.par_iter().filter_map(|(key, _)| fault(key)).collect()))
 }

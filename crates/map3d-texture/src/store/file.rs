@@ -16,6 +16,7 @@ use crate::store::source::{self, Level0Decoder};
 use map3d_image::ImageLimits;
 use map3d_image::PixelMask;
 use map3d_image::Raster;
+use map3d_image::decode::reading_version;
 
 pub const TEXTURE_MAGIC: &[u8; 4] = b"M3DT";
 pub const TEXTURE_VERSION: u32 = 2;
@@ -46,12 +47,17 @@ pub fn texture_path(folder: &Path, key: &TextureKey) -> PathBuf {
     folder.join(&name[..2]).join(format!("{name}.m3t"))
 }
 
-/// Computes the key of an image, an alpha image and the runs of a usage mask (none when every texel is used), each after its length as u64.
+/// Computes the key of an image, an alpha image and the runs of a usage mask (none when every texel is used), each after its length as u64. Behind
+/// them is the version of the reading of the images, unless that is 0.
 pub fn texture_key(image: &[u8], alpha: &[u8], runs: &[u8]) -> TextureKey {
     let mut hash = twox_hash::XxHash3_128::with_seed(0);
     for part in [image, alpha, runs] {
         hash.write(&(part.len() as u64).to_le_bytes());
         hash.write(part);
+    }
+    let version = reading_version(image).max(reading_version(alpha));
+    if version > 0 {
+        hash.write(&[version]);
     }
     hash.finish_128().to_be_bytes()
 }

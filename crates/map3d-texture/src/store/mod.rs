@@ -12,7 +12,8 @@ mod source;
 mod usage;
 
 pub use build_textures::{
-    MissingImages, Progress, TextureAsset, TextureInfo, TextureKeys, TextureSource, build_textures, prune_textures, texture_source,
+    MissingImages, Progress, TextureAsset, TextureFault, TextureInfo, TextureKeys, TextureSource, build_textures, find_damaged_images,
+    prune_textures, texture_source,
 };
 pub use cache::{CacheStats, LocalTextureCache, Texture, TextureCache};
 pub use file::{TEXTURE_MAGIC, TEXTURE_VERSION, TextureFile, TextureKey, encode_texture, hex, texture_key, texture_path, write_texture};

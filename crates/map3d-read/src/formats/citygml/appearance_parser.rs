@@ -11,10 +11,10 @@ use super::references::{DocumentNumber, OWN_DOCUMENT, References, Target};
 use super::xml_reader::XmlReader;
 use crate::city_model::appearance::{
     Appearances, Parameterization, PendingAppearance, Resolution, RingTexCoords, SurfaceData, SurfaceDataKind, TexturePlacement, TextureProperties,
-    ThemeSelection,
 };
 use crate::city_model::geo_transform::GeoTransform;
 use crate::city_model::ids::{self, Id};
+use crate::city_model::theme_selection::ThemeSelection;
 use crate::document::report_builder::{LimitCheck, ReportBuilder};
 
 /// Diffuse colour of an X3DMaterial without one, as defined by CityGML.
@@ -46,6 +46,8 @@ pub enum AppearanceScope {
 /// A target of surface data and its parameterization.
 struct SurfaceDataTarget {
     target: Id,
+    /// The document that is read should have it.
+    is_own: bool,
     parameterization: Parameterization,
 }
 
@@ -140,10 +142,15 @@ impl<R: BufRead> AppearanceParser<'_, R> {
             self.report.warn(Reason::SurfaceDataNotRead, type_name)?;
         }
         if !is_front {
-            self.report.note(Reason::AppearanceOfBackSide, describe(&kind));
+            self.report.note(Reason::AppearanceOfBackSide, kind.describe());
         }
         let number = self.appearances.add_surface_data(id, SurfaceData { kind, is_front, in_theme: false, resolution: Resolution::Unresolved });
-        targets.into_iter().for_each(|t| self.appearances.bind(t.target, number, t.parameterization));
+        for SurfaceDataTarget { target, is_own, parameterization } in targets {
+            self.appearances.bind(target, number, parameterization);
+            if !is_own {
+                self.appearances.mark_found(target);
+            }
+        }
         self.check_size()
     }
 
@@ -238,7 +245,13 @@ impl<R: BufRead> AppearanceParser<'_, R> {
 
     fn add_target(&self, target: Option<Target>, parameterization: Parameterization, properties: &mut SurfaceDataProperties) {
         let is_kept = |target: &Target| self.scope == AppearanceScope::Document || target.document == OWN_DOCUMENT;
-        properties.targets.extend(target.filter(is_kept).map(|target| SurfaceDataTarget { target: target.id, parameterization }));
+        // Targets of appearances in other documents are looked for there (`other_documents`).
+        let is_here = self.scope == AppearanceScope::Document && !self.references.is_in_other_document();
+        properties.targets.extend(target.filter(is_kept).map(|target| SurfaceDataTarget {
+            target: target.id,
+            is_own: is_here && target.document == OWN_DOCUMENT,
+            parameterization,
+        }));
     }
 
     /// Reads a TextureAssociation of CityGML 3.0: target and parameterization are siblings.
@@ -335,14 +348,6 @@ fn resolve_ring(references: &mut References, href: &str, document: Option<Docume
 /// Returns a transparency in [0, 1]; `None` for what is not a finite number.
 pub fn parse_transparency(text: &str) -> Option<f32> {
     text.trim().parse::<f32>().ok().filter(|v| v.is_finite()).map(|v| v.clamp(0.0, 1.0))
-}
-
-/// Describes surface data in the report: the image of a texture, else the type.
-fn describe(kind: &SurfaceDataKind) -> String {
-    match kind {
-        SurfaceDataKind::Texture(texture) => texture.image.clone(),
-        SurfaceDataKind::X3DMaterial { .. } | SurfaceDataKind::Unsupported => "X3DMaterial".into(),
-    }
 }
 
 fn build_kind(type_name: &str, properties: SurfaceDataProperties) -> SurfaceDataKind {

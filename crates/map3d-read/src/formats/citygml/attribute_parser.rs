@@ -4,7 +4,7 @@ use map3d_base::Result;
 use serde_json::Value;
 
 use super::xml_reader::{XmlEvent, XmlReader};
-use crate::city_model::attributes::{Attributes, add_attribute, add_code, parse_number_or_text};
+use crate::city_model::attributes::{Attributes, add_attribute, add_code, add_unit, parse_number_or_text};
 
 /// Returns true for the generic attribute elements of CityGML 1.0 and 2.0.
 pub fn is_generic_attribute(local_name: &str) -> bool {
@@ -20,9 +20,11 @@ pub fn read_generic_attribute(xml: &mut XmlReader, prefix: &str, attributes: &mu
         if is_generic_attribute(xml.local_name()) {
             read_generic_attribute(xml, &format!("{name}/"), attributes)?;
         } else {
+            let unit = xml.attribute("uom").map(|unit| unit.into_owned());
             let text = xml.read_text()?;
             let is_number = matches!(element.as_str(), "intAttribute" | "doubleAttribute" | "measureAttribute");
             add_attribute(attributes, &name, if is_number { parse_number_or_text(&text) } else { Value::String(text) });
+            add_unit(attributes, &name, unit.as_deref());
         }
     }
     Ok(())
@@ -51,6 +53,7 @@ pub struct GenericAttribute {
     value: Option<String>,
     is_number: bool,
     code_space: Option<String>,
+    unit: Option<String>,
     members: Vec<GenericAttribute>,
 }
 
@@ -62,6 +65,7 @@ pub fn read_generic_attribute_object(xml: &mut XmlReader) -> Result<GenericAttri
         match xml.local_name() {
             "name" => attribute.name = xml.read_text()?,
             "value" => {
+                attribute.unit = xml.attribute("uom").map(|unit| unit.into_owned());
                 attribute.code_space = xml.attribute("codeSpace").map(|space| space.into_owned());
                 attribute.value = Some(xml.read_text()?);
             }
@@ -88,6 +92,7 @@ impl GenericAttribute {
             None if self.is_number => add_attribute(attributes, &name, parse_number_or_text(&value)),
             None => add_attribute(attributes, &name, Value::String(value)),
         }
+        add_unit(attributes, &name, self.unit.as_deref());
     }
 }
 

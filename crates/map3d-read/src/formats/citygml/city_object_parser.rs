@@ -14,15 +14,16 @@ use super::geometry_parser::{GeometryParser, is_point_or_curve, is_surface};
 use super::positions::PositionFormat;
 use super::references::References;
 use super::xml_reader::{XmlEvent, XmlReader};
-use crate::city_model::appearance::ThemeSelection;
-use crate::city_model::attributes::{Attributes, add_attribute, add_code, add_data_type, parse_property};
+use crate::city_model::attributes::{Attributes, add_attribute, add_code, add_data_type, add_unit, parse_property};
 use crate::city_model::city_object::{CityObject, Feature, LodRepresentation, Representation};
 use crate::city_model::code_lists::CodeLists;
 use crate::city_model::crs_table::{CrsNumber, CrsTable};
 use crate::city_model::feature_types::{FeatureKind, classify_feature, is_open_space, is_subdivision, rank_feature, rank_object};
 use crate::city_model::geometry_arena::NO_NODE;
 use crate::city_model::ids::{self, hash_id};
+use crate::city_model::lifespan::Lifespan;
 use crate::city_model::standard_codes::{Code, is_adv_code};
+use crate::city_model::theme_selection::ThemeSelection;
 use crate::document::asset_folder::AssetFolder;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::ReportBuilder;
@@ -102,6 +103,8 @@ impl CityObjectParser<'_> {
             parent,
             rank,
             is_interior,
+            lifespan: Lifespan::default(),
+            is_left_out: false,
             crs,
             relief_lod,
             extent: None,
@@ -173,7 +176,7 @@ impl CityObjectParser<'_> {
             }
         }
         let code_space = self.xml.attribute("codeSpace").map(|space| space.into_owned());
-        let is_measure = self.xml.attribute("uom").is_some();
+        let unit = self.xml.attribute("uom").map(|unit| unit.into_owned());
         let depth = self.xml.depth();
         let mut text = String::new();
         // Properties directly inside this one are those of a data type without an element.
@@ -199,8 +202,11 @@ impl CityObjectParser<'_> {
             self.finish_data_type(data_type, number, &local_name);
         }
         let text = text.trim();
-        if is_simple && !text.is_empty() && self.feature(number).keeps_attributes {
-            self.add_simple_attribute(number, &local_name, code_space.as_deref(), is_measure, text);
+        if is_simple && !text.is_empty() {
+            self.feature(number).lifespan.add_property(&local_name, text);
+            if self.feature(number).keeps_attributes {
+                self.add_simple_attribute(number, &local_name, code_space.as_deref(), unit.as_deref(), text);
+            }
         }
         Ok(())
     }
@@ -211,13 +217,16 @@ impl CityObjectParser<'_> {
         number
     }
 
-    fn add_simple_attribute(&mut self, number: u32, name: &str, code_space: Option<&str>, is_measure: bool, text: &str) {
+    fn add_simple_attribute(&mut self, number: u32, name: &str, code_space: Option<&str>, unit: Option<&str>, text: &str) {
         let attributes = &mut self.city_object.features[number as usize].attributes;
         let is_adv = attributes.get("function/code").and_then(Value::as_str).is_some_and(|code| is_adv_code(code.get(..10).unwrap_or_default()));
         let code = Code { property: name, space: code_space, text, is_adv };
         match self.code_lists.find_label(code, self.report) {
             Some(label) => add_code(attributes, name, label, text),
-            None => add_attribute(attributes, name, parse_property(name, is_measure, text)),
+            None => {
+                add_attribute(attributes, name, parse_property(name, unit.is_some(), text));
+                add_unit(attributes, name, unit);
+            }
         }
     }
 

@@ -7,16 +7,17 @@ use map3d_base::{Reason, Result};
 
 use super::city_object_parser::CityObjectParser;
 use super::dictionary_parser::read_dictionary;
+use super::members::{Level, OpenLevels};
 use super::options::CityGmlOptions;
 use super::other_documents::OtherDocuments;
 use super::pre_scan::PreScan;
 use super::references::References;
 use super::xml_reader::{Malformed, XmlEvent, XmlReader};
-use crate::city_model::appearance::ThemeSelection;
 use crate::city_model::city_object::CityObject;
 use crate::city_model::code_lists::CodeLists;
 use crate::city_model::converter::{Conversion, FeatureConverter};
 use crate::city_model::crs_table::{CrsNumber, CrsTable, DOCUMENT_CRS};
+use crate::city_model::theme_selection::ThemeSelection;
 use crate::document::asset_folder::AssetFolder;
 use crate::document::images::DocumentImage;
 use crate::document::options::ReadOptions;
@@ -46,8 +47,7 @@ pub struct CityGmlReader {
     /// Buffers for numbers and text.
     values: Vec<f64>,
     text: String,
-    /// The root element was read.
-    has_root: bool,
+    levels: OpenLevels,
     at_end: bool,
     /// The document's transparency is opacity.
     inverted: bool,
@@ -57,7 +57,7 @@ impl CityGmlReader {
     /// Opens a document and runs the first pass. File names in the document are resolved inside its folder, or inside `options.folder`.
     pub fn open(path: &Path, options: &ReadOptions, formats: &'static [SourceFormat]) -> Result<Self> {
         let of_format: CityGmlOptions = options.parse_of_format()?;
-        let lod = of_format.parse_lod()?;
+        let (lod, date) = (of_format.parse_lod()?, of_format.parse_date()?);
         let folder = AssetFolder::for_document(path, options.folder.as_deref())?;
         let mut report = ReportBuilder::new(path, NAME, options.strict);
         let mut references = References::new(path, options.folder.as_deref())?;
@@ -66,7 +66,7 @@ impl CityGmlReader {
         report.set_crs(srs_name.clone());
         report_theme(&theme, &mut report);
         let inverted = transparency.is_inverted(options.transparency, &mut report);
-        let conversion = Conversion { lod, interiors: of_format.interiors, inverted, formats };
+        let conversion = Conversion { lod, interiors: of_format.interiors, date, inverted, formats };
         Ok(Self {
             xml: XmlReader::open(path)?,
             report,
@@ -81,32 +81,24 @@ impl CityGmlReader {
             instances: Vec::new(),
             values: Vec::new(),
             text: String::new(),
-            has_root: false,
+            levels: OpenLevels::default(),
             at_end: false,
             inverted,
         })
     }
 
-    /// Reads the next child of the root element; converts the city objects in it. Returns false at the end of the document.
+    /// Reads up to the end of the next city object, which is converted, or of another element. Returns false at the end of the document.
     fn read_member(&mut self) -> Result<bool> {
-        while !self.has_root {
-            match self.xml.next_event()? {
-                XmlEvent::Start => self.has_root = true,
-                XmlEvent::Eof => return Ok(false),
-                XmlEvent::End | XmlEvent::Text => {}
-            }
-        }
-        if !self.xml.next_child()? {
-            return Ok(false);
-        }
-        match self.xml.local_name() {
-            "cityObjectMember" | "featureMember" | "featureMembers" => {
-                while self.xml.next_child()? {
-                    self.read_city_object()?;
-                }
-            }
-            "boundedBy" => self.read_envelope()?,
-            _ => self.xml.skip()?,
+        match self.xml.next_tag()? {
+            XmlEvent::Eof => return Ok(false),
+            XmlEvent::End => return Ok(self.levels.end()),
+            XmlEvent::Text => {}
+            XmlEvent::Start => match self.levels.start(self.xml.local_name()) {
+                Level::Collection | Level::Member => {}
+                Level::CityObject => self.read_city_object()?,
+                Level::Other if self.xml.local_name() == "boundedBy" => self.read_envelope()?,
+                Level::Other => self.xml.skip()?,
+            },
         }
         Ok(true)
     }
@@ -178,6 +170,9 @@ impl CityGmlReader {
     fn finish(&mut self) -> Result<()> {
         self.at_end = true;
         self.read_other_documents()?;
+        if !self.xml.is_malformed() {
+            self.converter.report_missing_targets(&mut self.report)?;
+        }
         self.converter.convert_deferred(self.references.missing(), &mut self.report)?;
         self.instances = self.converter.finish_instances(self.references.missing(), &mut self.report)?;
         let interiors = self.report.count(Reason::PolygonOfInterior);

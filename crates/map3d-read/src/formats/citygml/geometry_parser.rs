@@ -2,7 +2,7 @@
 
 use map3d_base::{Reason, Result, Vec3};
 
-use super::coordinates::{Separators, parse_coordinates, parse_points};
+use super::coordinates::{Dimension, Separators, parse_coordinates, parse_points};
 use super::positions::{PositionFormat, PositionsRead};
 use super::references::References;
 use super::textured_surface_parser::read_own_appearance;
@@ -161,6 +161,7 @@ impl GeometryParser<'_> {
         }
         let node = self.geometry.add(id, parent, NodeKind::Polygon { first_ring, rings });
         self.geometry.nodes[node as usize].crs = read.crs.unwrap_or(format.crs);
+        self.geometry.nodes[node as usize].is_flat = read.is_flat;
         Ok(node)
     }
 
@@ -213,22 +214,22 @@ impl GeometryParser<'_> {
 
     /// Reads the current element up to its end if it contains positions; enters any other element.
     fn read_positions(&mut self, format: PositionFormat, read: &mut PositionsRead) -> Result<()> {
-        let valid = match self.xml.local_name() {
+        let dimension = match self.xml.local_name() {
             "posList" | "pos" => {
                 self.text.clear();
                 self.xml.append_text(self.text)?;
-                parse_points(self.text, format.dimension, self.values, &mut self.geometry.points).is_some()
+                parse_points(self.text, format.dimension, self.values, &mut self.geometry.points)
             }
             "coordinates" => {
                 let separators = self.parse_separators();
                 self.text.clear();
                 self.xml.append_text(self.text)?;
-                parse_coordinates(self.text, &separators, &mut self.geometry.points).is_some()
+                parse_coordinates(self.text, &separators, &mut self.geometry.points)
             }
             "coord" => self.read_coord()?,
             _ => return Ok(()),
         };
-        read.add_positions(format.crs, valid);
+        read.add_positions(format.crs, dimension);
         Ok(())
     }
 
@@ -238,18 +239,21 @@ impl GeometryParser<'_> {
         Separators { decimal: parse("decimal", default.decimal), coordinate: parse("cs", default.coordinate), tuple: parse("ts", default.tuple) }
     }
 
-    fn read_coord(&mut self) -> Result<bool> {
+    fn read_coord(&mut self) -> Result<Option<Dimension>> {
         let mut point: Vec3 = [0.0; 3];
-        let mut valid = true;
+        let mut dimension = Some(Dimension::Two);
         while self.xml.next_child()? {
             let axis = ["X", "Y", "Z"].iter().position(|name| *name == self.xml.local_name());
             let value = self.xml.read_text()?.parse();
             match (axis, value) {
-                (Some(axis), Ok(value)) => point[axis] = value,
-                _ => valid = false,
+                (Some(axis), Ok(value)) => {
+                    point[axis] = value;
+                    dimension = if axis == 2 { dimension.and(Some(Dimension::Three)) } else { dimension };
+                }
+                _ => dimension = None,
             }
         }
         self.geometry.points.push(point);
-        Ok(valid)
+        Ok(dimension)
     }
 }

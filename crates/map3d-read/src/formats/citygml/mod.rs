@@ -1,4 +1,4 @@
-//! Reads CityGML 0.4 to 3.0. Element names are matched without their namespace.
+//! Reads CityGML 0.4 to 3.0, also in the feature collections that web feature services answer with. Element names are matched without their namespace.
 //!
 //! The file is read twice. The first pass (`pre_scan`) collects the CRS, the themes, appearances outside city objects, and the ids that other
 //! city objects refer to. The second pass (`citygml_reader`) parses and converts one city object at a time.
@@ -14,6 +14,7 @@ mod geometry_parser;
 mod grid_parser;
 mod grid_values;
 mod implicit_geometry_parser;
+mod members;
 mod options;
 mod other_documents;
 mod positions;
@@ -27,12 +28,13 @@ mod tin_parts;
 mod xml_reader;
 
 use self::citygml_reader::{CityGmlReader, NAME};
+use self::members::is_city_model;
 use crate::document::source_format::SourceFormat;
 
 pub const CITYGML: SourceFormat = SourceFormat {
     name: NAME,
     version: 12,
     is_library_object: false,
-    detect: |head| head.xml_root() == Some("CityModel"),
+    detect: is_city_model,
     open: |path, options, formats| Ok(Box::new(CityGmlReader::open(path, options, formats)?)),
 };

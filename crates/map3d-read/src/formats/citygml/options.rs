@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use map3d_base::{Error, Result};
 use serde::Deserialize;
 
+use crate::city_model::lifespan::{Day, VersionDate};
+
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CityGmlOptions {
@@ -14,11 +16,20 @@ pub struct CityGmlOptions {
     pub lod: Option<String>,
     /// Converts rooms and what is in them.
     pub interiors: bool,
+    /// Converts the versions of features that exist on this day; by default, those that have not ended.
+    pub at: Option<String>,
     /// Other files in the folder of the document whose appearances target surfaces of it.
     pub appearance_files: Vec<PathBuf>,
 }
 
 impl CityGmlOptions {
+    /// Returns the date whose versions are converted.
+    pub fn parse_date(&self) -> Result<VersionDate> {
+        let Some(text) = &self.at else { return Ok(VersionDate::today()) };
+        let day = Day::parse(text).ok_or_else(|| Error::argument(format!("at {text:?}: expected a date such as 2026-11-27")))?;
+        Ok(VersionDate::Requested(day))
+    }
+
     /// Returns the requested level of detail.
     pub fn parse_lod(&self) -> Result<Option<u8>> {
         let Some(text) = &self.lod else { return Ok(None) };

@@ -4,29 +4,29 @@ use std::io::BufRead;
 
 use map3d_base::{Reason, Result, Vec3};
 
-use super::coordinates::parse_points;
+use super::coordinates::{Dimension, parse_points};
 use super::xml_reader::{XmlEvent, XmlReader};
 use crate::city_model::crs_table::{CrsNumber, CrsTable, TOO_MANY};
 
 /// How the numbers of positions are read: what the nearest elements above them say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PositionFormat {
-    pub dimension: usize,
+    /// Numbers of each position, if an element says.
+    pub dimension: Option<usize>,
     pub crs: CrsNumber,
 }
 
 impl PositionFormat {
     /// `crs`: of the feature that has the geometry.
     pub fn new(crs: CrsNumber) -> Self {
-        const DEFAULT_DIMENSION: usize = 3;
-        Self { dimension: DEFAULT_DIMENSION, crs }
+        Self { dimension: None, crs }
     }
 
     /// Returns the format of positions in the current element.
     pub fn refine<R: BufRead>(self, xml: &XmlReader<R>, crs_table: &mut CrsTable) -> Self {
         let dimension = xml.attribute("srsDimension").and_then(|n| n.trim().parse().ok());
         let crs = xml.attribute("srsName").and_then(|name| crs_table.find(&name));
-        Self { dimension: dimension.unwrap_or(self.dimension), crs: crs.unwrap_or(self.crs) }
+        Self { dimension: dimension.or(self.dimension), crs: crs.unwrap_or(self.crs) }
     }
 }
 
@@ -37,17 +37,21 @@ pub struct PositionsRead {
     pub crs: Option<CrsNumber>,
     /// Other positions are in another one.
     pub is_mixed: bool,
+    /// Some positions have no height.
+    pub is_flat: bool,
 }
 
 impl Default for PositionsRead {
     fn default() -> Self {
-        Self { valid: true, crs: None, is_mixed: false }
+        Self { valid: true, crs: None, is_mixed: false, is_flat: false }
     }
 }
 
 impl PositionsRead {
-    pub fn add_positions(&mut self, crs: CrsNumber, valid: bool) {
-        self.valid &= valid;
+    /// `dimension`: `None` for positions that cannot be read.
+    pub fn add_positions(&mut self, crs: CrsNumber, dimension: Option<Dimension>) {
+        self.valid &= dimension.is_some();
+        self.is_flat |= dimension == Some(Dimension::Two);
         self.is_mixed |= *self.crs.get_or_insert(crs) != crs;
     }
 
@@ -84,7 +88,7 @@ pub fn read_point<R: BufRead>(xml: &mut XmlReader<R>) -> Result<Option<NamedPoin
                 let text = xml.read_text()?.replace(',', " ");
                 let (mut values, mut points) = (Vec::new(), Vec::new());
                 let dimension = text.split_whitespace().count();
-                let point = parse_points(&text, dimension, &mut values, &mut points).and(points.first().copied());
+                let point = parse_points(&text, Some(dimension), &mut values, &mut points).and_then(|_| points.first().copied());
                 found = point.map(|point| NamedPoint { point, srs_name: srs_name.clone() }).or(found);
             }
             XmlEvent::Eof => break,

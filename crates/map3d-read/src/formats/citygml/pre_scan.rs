@@ -9,15 +9,18 @@ use std::path::{Path, PathBuf};
 use map3d_base::{Error, Reason, Result};
 
 use super::appearance_parser::{AppearanceParser, AppearanceScope, parse_transparency};
+use super::members::{OpenLevels, is_collection};
 use super::options::CityGmlOptions;
 use super::other_documents::OtherDocuments;
 use super::references::References;
 use super::tag_scanner::{TagKind, TagScanner};
 use super::xml_reader::{XmlEvent, XmlReader, local_part, parse_attributes, unescape_lossy, unsupported};
-use crate::city_model::appearance::{Appearances, ThemeSelection};
+use crate::city_model::appearance::Appearances;
 use crate::city_model::crs_table::CrsTable;
 use crate::city_model::geometry_arena::GeometryArena;
 use crate::city_model::ids::{IdSet, hash_id};
+use crate::city_model::theme_selection::ThemeSelection;
+use crate::document::asset_folder::AssetFolder;
 use crate::document::options::ReadOptions;
 use crate::document::report_builder::ReportBuilder;
 use crate::document::text_input::{EncodingFault, open_checked_xml};
@@ -54,27 +57,34 @@ impl PreScan {
         let mut scanner = TagScanner::new(input);
         let mut links = ObjectReferences::default();
         let (mut depth, mut has_elements) = (0usize, false);
+        let mut levels = OpenLevels::default();
         while let Some(kind) = scanner.next_tag().map_err(io)? {
             match kind {
                 TagKind::Doctype => return Err(unsupported(path, "a document type definition")),
-                TagKind::End => depth = depth.saturating_sub(1),
+                TagKind::End => {
+                    depth = depth.saturating_sub(1);
+                    if depth < levels.depth() {
+                        levels.end();
+                    }
+                }
                 TagKind::Start | TagKind::Empty => {
                     has_elements = true;
                     let text = std::str::from_utf8(scanner.tag()).map_or_else(|_| String::from_utf8_lossy(scanner.tag()), Cow::Borrowed);
                     let (name, attributes) = text.split_at(text.bytes().position(|b| b.is_ascii_whitespace()).unwrap_or(text.len()));
                     let name = local_part(name);
-                    if depth == 0 && name != "CityModel" {
-                        return Err(Error::format(path, format!("the root element is {name:?}; expected CityModel")));
+                    if depth == 0 && !is_collection(name) {
+                        return Err(Error::format(path, format!("the root element is {name:?}; expected CityModel or FeatureCollection")));
+                    }
+                    let is_property = depth == levels.depth() && levels.is_in_collection();
+                    if kind == TagKind::Start && depth == levels.depth() {
+                        levels.start(name);
                     }
                     scan.scan_attributes(attributes, references, &mut links);
                     let parse: Option<Parse> = match (kind, name) {
-                        (TagKind::Start, "appearanceMember") if depth == 1 => Some(Self::parse_appearance_member),
+                        (TagKind::Start, "appearanceMember") if is_property => Some(Self::parse_appearance_member),
                         (TagKind::Start, "theme") => Some(Self::parse_theme),
                         (TagKind::Start, "X3DMaterial") => Some(Self::parse_material),
-                        (TagKind::Start, "ParameterizedTexture" | "GeoreferencedTexture") => {
-                            scan.theme.count_texture_of_current();
-                            None
-                        }
+                        (TagKind::Start, "imageURI") => Some(Self::parse_image),
                         _ => None,
                     };
                     match parse {
@@ -83,7 +93,7 @@ impl PreScan {
                     }
                 }
             }
-            if depth <= 1 {
+            if depth <= levels.depth() {
                 links.finish_object(&mut scan.referenced_ids);
             }
         }
@@ -92,8 +102,11 @@ impl PreScan {
         }
         links.finish_object(&mut scan.referenced_ids);
         scan.read_other_appearances(options, &of_format.appearance_files, references, report)?;
-        scan.appearances.count_textures(&mut scan.theme);
-        scan.theme.choose();
+        scan.appearances.count_themes(&mut scan.theme);
+        let mut folder = AssetFolder::for_document(path, options.folder.as_deref())?;
+        for missed in scan.theme.choose(&mut |image| folder.find(image).is_ok()) {
+            report.note(Reason::ThemeWithoutImages, missed);
+        }
         scan.appearances.count_transparency(&mut scan.transparency);
         for other in scan.appearances.resolve_pending(scan.theme.selected()) {
             report.note(Reason::AppearanceOfOtherTheme, other);
@@ -181,6 +194,18 @@ impl PreScan {
                 }
             }
             self.transparency.add(transparency);
+            self.theme.count_material();
+        }
+        Ok(xml.into_inner())
+    }
+
+    /// Parses the current name of an image; the scanner continues after it.
+    fn parse_image(&mut self, scanner: TagScanner, _: &ReadOptions, _: &mut References, report: &mut ReportBuilder) -> Result<TagScanner> {
+        let mut xml = XmlReader::new(scanner, report.path());
+        if let Ok(XmlEvent::Start) = xml.next_event()
+            && let Ok(name) = xml.read_text()
+        {
+            self.theme.count_image(&name);
         }
         Ok(xml.into_inner())
     }

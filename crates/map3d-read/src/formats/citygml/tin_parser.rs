@@ -82,6 +82,7 @@ impl GeometryParser<'_> {
             Ok(triangles) => {
                 self.report_tin(&triangles)?;
                 self.geometry.nodes[node as usize].crs = crs;
+                self.geometry.nodes[node as usize].is_flat = tin.read.is_flat;
                 self.add_tin_triangles(node, &prepared.points, &triangles.triangles)
             }
         }
@@ -102,13 +103,14 @@ impl GeometryParser<'_> {
     fn add_tin_triangles(&mut self, node: NodeId, points: &[Vec3], triangles: &[[u32; 3]]) -> Result<()> {
         const BYTES: usize = size_of::<GeometryNode>() + size_of::<Ring>() + 4 * size_of::<Vec3>();
         self.check_size_with((triangles.len() * BYTES) as u64)?;
-        let crs = self.geometry.node(node).crs;
+        let GeometryNode { crs, is_flat, .. } = *self.geometry.node(node);
         for [a, b, c] in triangles {
             let (first_ring, start) = (self.geometry.rings.len() as u32, self.geometry.points.len() as u32);
             self.geometry.points.extend([a, b, c, a].map(|k| points[*k as usize]));
             self.geometry.rings.push(Ring { id: ids::NONE, start, end: start + 4 });
             let triangle = self.geometry.add(ids::NONE, node, NodeKind::Polygon { first_ring, rings: 1 });
             self.geometry.nodes[triangle as usize].crs = crs;
+            self.geometry.nodes[triangle as usize].is_flat = is_flat;
         }
         Ok(())
     }

@@ -8,6 +8,7 @@ mod mtl;
 mod obj_reader;
 mod options;
 
+pub use self::mtl::{library_names, texture_name};
 use self::obj_reader::{NAME, ObjReader};
 use crate::document::file_head::FileHead;
 use crate::document::source_format::SourceFormat;

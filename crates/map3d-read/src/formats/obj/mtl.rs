@@ -51,18 +51,11 @@ impl MaterialLibrary {
 
     /// Loads the files that a `mtllib` line names: one file whose name contains spaces, or several files.
     pub fn load_statement(&mut self, rest: &[u8], folder: &mut AssetFolder, report: &mut ReportBuilder) -> Result<()> {
-        let whole = decode_name(rest).trim_matches('"').to_owned();
-        if whole.is_empty() {
+        let names = library_names(rest, folder);
+        if names.is_empty() {
             return report.warn(Reason::MaterialLibraryUnnamed, String::new());
         }
-        if folder.find(&whole).is_ok() || !whole.contains(char::is_whitespace) {
-            return self.load_named(&whole, folder, report);
-        }
-        let several: Vec<&str> = whole.split_whitespace().collect();
-        if several.iter().all(|name| folder.find(name).is_err()) {
-            return self.load_named(&whole, folder, report);
-        }
-        several.into_iter().try_for_each(|name| self.load_named(name, folder, report))
+        names.into_iter().try_for_each(|name| self.load_named(&name, folder, report))
     }
 
     fn load_named(&mut self, name: &str, folder: &mut AssetFolder, report: &mut ReportBuilder) -> Result<()> {
@@ -116,6 +109,21 @@ impl MaterialLibrary {
     }
 }
 
+/// Returns the names of the files of a `mtllib` line: one whose name contains spaces, or several; none for an empty line.
+pub fn library_names(rest: &[u8], folder: &mut AssetFolder) -> Vec<String> {
+    let whole = decode_name(rest).trim().trim_matches('"').to_owned();
+    let several: Vec<String> = whole.split_whitespace().map(|name| name.trim_matches('"').to_owned()).collect();
+    if several.len() <= 1 || folder.find(&whole).is_ok() || several.iter().all(|name| folder.find(name).is_err()) {
+        return if whole.is_empty() { Vec::new() } else { vec![whole] };
+    }
+    several
+}
+
+/// Returns the name of the file of a `map_…` line.
+pub fn texture_name(rest: &[u8]) -> Option<String> {
+    parse_texture_map(rest.trim_ascii()).map(|map| map.name)
+}
+
 fn apply_statement(material: &mut MtlMaterial, word: &[u8], rest: &[u8], prefix: &str, folder: &mut AssetFolder) {
     let mut map = || parse_texture_map(rest).map(|map| prefer_library_folder(map, prefix, folder));
     match word.to_ascii_lowercase().as_slice() {
@@ -158,7 +166,7 @@ fn parse_texture_map(rest: &[u8]) -> Option<TextureMap> {
             _ => break,
         };
     }
-    map.name = decode_name(rest).trim_matches('"').to_owned();
+    map.name = decode_name(rest).trim().trim_matches('"').to_owned();
     (!map.name.is_empty()).then_some(map)
 }
 
