@@ -64,4 +64,4 @@ def test_every_binary_layout_has_a_table() -> None:
     text = "".join(page.read_text("utf-8") for page in PAGES)
     magics = set(re.findall(r"M3D[A-Z]?\b", text)) - {"M3D"}
     in_tables = {magic for page in PAGES for fields in layouts(page) for magic in re.findall(r"M3D[A-Z]", fields[0][3])}
-    assert in_tables == magics == {"M3DA", "M3DB", "M3DC", "M3DG", "M3DI", "M3DT", "M3DV"}
+    assert in_tables == magics == {"M3DA", "M3DB", "M3DC", "M3DG", "M3DH", "M3DI", "M3DO", "M3DT", "M3DV"}

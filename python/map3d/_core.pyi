@@ -133,7 +133,7 @@ class AssetWriter:
 
 @final
 class AssetMesh:
-    """The mesh.m3a of an asset folder, mapped and checked. Arrays are copies; raises FormatError."""
+    """The mesh.m3a of an asset folder, mapped and checked. Arrays are copies, as imported; raises FormatError."""
     def __init__(self, path: str) -> None: ...
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -153,9 +153,67 @@ class AssetMesh:
     @property
     def prototypes(self) -> NDArray[np.uint32]:
         """(nt,) numbers of prototypes; 0 for world geometry."""
+    def placed(self, object: int, transform: Sequence[float]) -> list[float] | None:
+        """Returns the transform of an instance of an object as drawn, row-major 3 × 4; None if the object is left out."""
     def boxes(self, count: int, extent: str | None = None) -> tuple[list[_Box | None], dict[int, _Box], list[int]]:
-        """Returns the boxes of `count` objects in world coordinates, without placed prototypes, None if empty; those of prototypes in
+        """Returns the boxes of `count` objects as drawn, in world coordinates, without placed prototypes, None if empty; those of prototypes in
         their own frame; and for each object the number of triangles outside the extent (JSON of `find_clusters`), which its box does not include."""
+
+@final
+class Survey:
+    """The objects of an asset folder as imported, each without its children: arrays with an entry for each. Stored beside the mesh (spec/scene.md)."""
+    def __init__(self, folder: str) -> None: ...
+    @property
+    def classes(self) -> list[str]: ...
+    @property
+    def lods(self) -> list[str]:
+        """Levels of detail; the first is empty."""
+    @property
+    def boxes(self) -> NDArray[np.float64]:
+        """(n, 2, 3) low and high corners, world coordinates, placed prototypes included; infinite, low above high, without geometry."""
+    @property
+    def names(self) -> NDArray[np.uint64]:
+        """(n,) hashes of names; 0 without one."""
+    @property
+    def contents(self) -> NDArray[np.uint64]:
+        """(n,) hashes of the geometry to the millimetre; 0 without any."""
+    @property
+    def triangles(self) -> NDArray[np.uint32]: ...
+    @property
+    def parents(self) -> NDArray[np.int64]:
+        """(n,) numbers of the parents; -1 at the top."""
+    @property
+    def class_numbers(self) -> NDArray[np.uint16]:
+        """(n,) indices into `classes`."""
+    @property
+    def lod_numbers(self) -> NDArray[np.uint16]:
+        """(n,) indices into `lods`."""
+    @property
+    def flags(self) -> NDArray[np.uint32]:
+        """(n,) bit 0: some triangle is textured; bit 1: the object has placed prototypes."""
+
+@final
+class Surface:
+    """A surface of the ground."""
+    @staticmethod
+    def of_asset(folder: str, objects: NDArray[np.bool_], is_adjusted: bool) -> Surface:
+        """The triangles of those objects of an asset folder for which `objects`, (n,), is true; as drawn, else as imported."""
+    @staticmethod
+    def of_mesh(positions: NDArray[np.float64], triangles: NDArray[np.uint32]) -> Surface:
+        """positions (n, 3) world, triangles (t, 3)."""
+
+def surface_heights(surfaces: Sequence[Surface], points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the (n,) heights of the highest surface at (n, 2) points in world coordinates, NaN where there is none."""
+
+def drape_objects(folder: str, bases: NDArray[np.float64], scale: float, surfaces: Sequence[Surface], fallback: Surface | None = None) -> int:
+    """Writes draped.m3a of an asset folder, which stands for the objects with a base; returns the number of its triangles. `bases`: (n,) the height of
+    each object that lies on the ground, NaN for objects that are not draped; `fallback`: ground where the surfaces have none."""
+
+def write_adjustments(folder: str, scale: float, shifts: NDArray[np.float64]) -> None:
+    """Writes adjustments.m3h of an asset folder: heights as drawn are z · scale + the shift of the object; objects with NaN are left out."""
+
+def read_adjustments(folder: str) -> tuple[float, NDArray[np.float64]] | None:
+    """Returns the scale and the (n,) shifts of an asset folder; None if it is drawn as imported."""
 
 def detect_format(head: bytes) -> str | None:
     """Returns the name of the format of the document that begins so. `head`: the first HEAD_BYTES of the file, unpacked, or all."""

@@ -8,10 +8,11 @@ pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_
 
 from tests.odd_cities.contradictions import Row, check
 from tests.odd_cities.rows_of_files import FILES
+from tests.odd_cities.rows_of_height import HEIGHT, SAME_OBJECTS
 from tests.odd_cities.rows_of_images import IMAGES
 from tests.odd_cities.rows_of_plan import PLAN
 
-ROWS: list[Row] = [*PLAN, *FILES, *IMAGES]
+ROWS: list[Row] = [*PLAN, *HEIGHT, *FILES, *SAME_OBJECTS, *IMAGES]
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[row.name for row in ROWS])

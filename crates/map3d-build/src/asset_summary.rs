@@ -5,7 +5,7 @@ use std::path::Path;
 
 use bytemuck::{Pod, Zeroable};
 use map3d_base::file::{self, HEADER_BYTES, aligned, header_start};
-use map3d_base::{Error, Result};
+use map3d_base::{Box3, Error, Result};
 use map3d_scene::records::{InstanceRecord, MaterialRecord};
 use map3d_texture::{TextureInfo, TextureSource};
 use serde::{Deserialize, Serialize};
@@ -13,11 +13,12 @@ use twox_hash::{XxHash3_64, XxHash3_128};
 
 use crate::BuildReport;
 use crate::ground::GroundLevel;
+use crate::lows::Lows;
 use crate::triangle::BuildTriangle;
 
 pub(crate) const EXTENSION: &str = "m3v";
 const MAGIC: &[u8; 4] = b"M3DV";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Summary of one asset. Follows from the asset, the request and the keys of its textures; `cells` also from the square.
 #[derive(Clone, Debug, Default)]
@@ -36,11 +37,10 @@ pub(crate) struct AssetDetails {
     /// Digest of the input of the summary; the file calls it `mark`.
     #[serde(rename = "mark")]
     pub digest: String,
-    /// `GroundLevel` as bits.
-    pub level: [u64; 8],
+    pub level: LevelDocument,
     /// The level in each region of the extent, if it has several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub levels: Vec<[u64; 8]>,
+    pub levels: Vec<LevelDocument>,
     /// This asset's share of the report.
     pub counts: BuildReport,
     pub textures: Vec<SummaryTexture>,
@@ -125,18 +125,27 @@ fn triangle_hash(t: &BuildTriangle, material: u64) -> u128 {
     XxHash3_128::oneshot_with_seed(material, bytemuck::bytes_of(&plain))
 }
 
+/// A `GroundLevel`: its box as bits, low and high corner; rows of its lows.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct LevelDocument {
+    bounds: [u64; 6],
+    has_terrain: bool,
+    grounds: Vec<(i64, u64, u64)>,
+    lows: Vec<(i64, u64, u64)>,
+}
+
 impl GroundLevel {
-    pub fn to_bits(self) -> [u64; 8] {
+    pub fn to_document(&self) -> LevelDocument {
         let (lo, hi) = (self.bounds.lo.map(f64::to_bits), self.bounds.hi.map(f64::to_bits));
-        [lo[0], lo[1], lo[2], hi[0], hi[1], hi[2], self.ground_m.to_bits(), u64::from(self.has_terrain)]
+        let bounds = [lo[0], lo[1], lo[2], hi[0], hi[1], hi[2]];
+        LevelDocument { bounds, has_terrain: self.has_terrain, grounds: self.grounds.rows(), lows: self.lows.rows() }
     }
 
-    pub fn from_bits(bits: [u64; 8]) -> Self {
-        let mut out = Self::new();
-        out.bounds.lo = [0, 1, 2].map(|k| f64::from_bits(bits[k]));
-        out.bounds.hi = [3, 4, 5].map(|k| f64::from_bits(bits[k]));
-        (out.ground_m, out.has_terrain) = (f64::from_bits(bits[6]), bits[7] != 0);
-        out
+    pub fn from_document(document: &LevelDocument) -> Self {
+        let at = |k: usize| f64::from_bits(document.bounds[k]);
+        let bounds = Box3 { lo: [at(0), at(1), at(2)], hi: [at(3), at(4), at(5)] };
+        let (grounds, lows) = (Lows::from_rows(&document.grounds), Lows::from_rows(&document.lows));
+        Self { bounds, has_terrain: document.has_terrain, grounds, lows }
     }
 }
 
@@ -188,7 +197,8 @@ mod tests {
         let path = std::env::temp_dir().join(format!("map3d-summary-{}", std::process::id())).join("a.m3v");
         let mut level = GroundLevel::new();
         level.bounds.add_point([1.0 / 3.0, -2e7 / 7.0, 3.0]);
-        let details = AssetDetails { digest: "m".into(), level: level.to_bits(), materials: vec![7, u64::MAX], ..AssetDetails::default() };
+        level.lows.add(-3.0);
+        let details = AssetDetails { digest: "m".into(), level: level.to_document(), materials: vec![7, u64::MAX], ..AssetDetails::default() };
         let cell = CellSum { cell: 5, count: 6, sum: [7, 8] };
         let instance = InstanceRecord { object_id: 9, ..InstanceRecord::zeroed() };
         let summary = AssetSummary { details, cells: vec![cell], instances: vec![instance], ids: vec![9, 3] };
@@ -196,8 +206,8 @@ mod tests {
         let back = AssetSummary::read(&path).expect("read");
         assert_eq!((&back.cells, &back.instances, &back.ids), (&summary.cells, &summary.instances, &summary.ids));
         assert_eq!(back.details.materials, [7, u64::MAX]);
-        let found = GroundLevel::from_bits(back.details.level);
-        assert_eq!((found.bounds.lo, found.ground_m), (level.bounds.lo, f64::INFINITY));
+        let found = GroundLevel::from_document(&back.details.level);
+        assert_eq!((found.bounds.lo, found.grounds.lowest_m(), found.lows.lowest_m()), (level.bounds.lo, None, Some(-3.0)));
         let good = std::fs::read(&path).expect("read");
         for cut in [0, 10, 64, 100, good.len() - 1] {
             std::fs::write(&path, &good[..cut]).expect("write");

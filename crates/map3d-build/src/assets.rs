@@ -9,6 +9,7 @@ use twox_hash::XxHash3_128;
 
 use crate::BuildRequest;
 use crate::asset_summary::{AssetSummary, EXTENSION};
+use crate::content::adjusted_heads;
 use crate::files::prune;
 
 /// Incremented when the same assets would yield other summaries or chunks.
@@ -160,6 +161,7 @@ fn compute_digest(folder: &Path, request: &BuildRequest, extent: Option<&KeptSpa
     write(&file.metadata().map_err(io(&mesh))?.len().to_le_bytes());
     std::io::Read::read_exact(&mut file, &mut head).map_err(|_| Error::format(&mesh, "truncated"))?;
     write(&head);
+    adjusted_heads(folder)?.iter().for_each(|head| write(head));
     let mut uncolored = false;
     for name in ["materials.json", "ids.u32", OBJECTS] {
         let path = folder.join(name);
@@ -202,11 +204,14 @@ impl Asset {
 
     fn validate(&self) -> Result<()> {
         let fail = |what: String| Err(Error::format(self.folder.join("mesh.m3a"), what));
-        if let Some(m) = self.mesh.materials().iter().find(|m| **m as usize >= self.materials.len()) {
+        if let Some(m) = self.mesh.drawn().flat_map(AssetMesh::materials).find(|m| **m as usize >= self.materials.len()) {
             return fail(format!("material {m} of {}", self.materials.len()));
         }
-        if let Some(o) = self.mesh.objects().iter().find(|o| **o as usize >= self.ids.len()) {
+        if let Some(o) = self.mesh.drawn().flat_map(AssetMesh::objects).find(|o| **o as usize >= self.ids.len()) {
             return fail(format!("object {o}, but ids.u32 holds {} ids", self.ids.len()));
+        }
+        if let Some(count) = self.mesh.adjustments().map(|a| a.shifts.len()).filter(|n| *n != self.ids.len()) {
+            return fail(format!("adjustments of {count} objects, but ids.u32 holds {} ids", self.ids.len()));
         }
         let sound = |i: &Instance| i.prototype > 0 && (i.object as usize) < self.ids.len() && i.transform.iter().all(|v| v.is_finite());
         match self.instances.iter().position(|i| !sound(i)) {

@@ -101,7 +101,7 @@ impl Build<'_> {
 
     fn ground_level<'s>(&'s self, fresh: impl Iterator<Item = &'s AssetSummary>) -> GroundLevel {
         let mut out = GroundLevel::new();
-        self.assets.summaries().chain(fresh).for_each(|s| out.merge(&GroundLevel::from_bits(s.details.level)));
+        self.assets.summaries().chain(fresh).for_each(|s| out.merge(&GroundLevel::from_document(&s.details.level)));
         out
     }
 
@@ -113,14 +113,14 @@ impl Build<'_> {
         }
         let mut out = vec![GroundLevel::new(); regions];
         for summary in self.assets.summaries().chain(fresh) {
-            out.iter_mut().zip(&summary.details.levels).for_each(|(level, bits)| level.merge(&GroundLevel::from_bits(*bits)));
+            out.iter_mut().zip(&summary.details.levels).for_each(|(level, document)| level.merge(&GroundLevel::from_document(document)));
         }
         out
     }
 
     fn ground_planes(&mut self, whole: &GroundLevel, fresh: &[AssetSummary]) -> Result<Vec<BuildTriangle>> {
         let mut planes = Vec::new();
-        for level in self.ground_levels(*whole, fresh) {
+        for level in self.ground_levels(whole.clone(), fresh) {
             let wanted = match self.request.options.ground_plane {
                 GroundPlane::Off => false,
                 GroundPlane::On => true,

@@ -8,6 +8,7 @@ use map3d_base::asset::Rank;
 use map3d_base::{Box3, Error, Result};
 use map3d_scene::lattice::{Point, metres, snap};
 
+use crate::lows::Lows;
 use crate::triangle::BuildTriangle;
 
 /// The diagonal of a square of the plane's grid stays below the length at which edges are split.
@@ -22,17 +23,19 @@ const MAX_SQUARES: f64 = 65_536.0;
 pub(crate) const MAX_ALL_SQUARES: usize = 500_000;
 
 /// Extent and ground height of content.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct GroundLevel {
     pub bounds: Box3,
     pub has_terrain: bool,
-    /// Lowest point of ground surfaces, if there are any.
-    pub ground_m: f64,
+    /// Those of ground surfaces.
+    pub grounds: Lows,
+    /// Those of all surfaces.
+    pub lows: Lows,
 }
 
 impl GroundLevel {
     pub fn new() -> Self {
-        Self { bounds: Box3::EMPTY, has_terrain: false, ground_m: f64::INFINITY }
+        Self { bounds: Box3::EMPTY, has_terrain: false, grounds: Lows::default(), lows: Lows::default() }
     }
 
     pub fn add_triangle(&mut self, t: &BuildTriangle) {
@@ -42,8 +45,9 @@ impl GroundLevel {
 
     fn add(&mut self, rank: u8, lowest_m: f64) {
         self.has_terrain |= rank == Rank::Terrain as u8;
+        self.lows.add(lowest_m);
         if rank == Rank::Ground as u8 {
-            self.ground_m = self.ground_m.min(lowest_m);
+            self.grounds.add(lowest_m);
         }
     }
 
@@ -51,7 +55,8 @@ impl GroundLevel {
     pub fn merge(&mut self, other: &Self) {
         self.bounds.add_box(&other.bounds);
         self.has_terrain |= other.has_terrain;
-        self.ground_m = self.ground_m.min(other.ground_m);
+        self.grounds.merge(&other.grounds);
+        self.lows.merge(&other.lows);
     }
 
     /// Appends the triangles of the plane; `asset` is a number that no asset has, `content` the local boxes of everything that the scene has. Returns
@@ -60,7 +65,7 @@ impl GroundLevel {
         if object_id == 0 {
             return Err(Error::argument("build request: ground_id is 0, but the scene needs a ground plane; register an object for it"));
         }
-        let height = if self.ground_m.is_finite() { self.ground_m } else { self.bounds.lo[2] };
+        let height = self.grounds.lowest_m().or_else(|| self.lows.lowest_m()).unwrap_or(self.bounds.lo[2]);
         let grid = [0, 1].map(|k| self.grid(k));
         let Some(squares) = squares(&grid, content, MAX_ALL_SQUARES - (out.len() / 2).min(MAX_ALL_SQUARES)) else { return Ok(false) };
         let corner = |i: usize, j: usize| -> Point { snap([grid[0].line(i), grid[1].line(j), height]) };
@@ -138,7 +143,8 @@ mod tests {
     #[test]
     fn the_plane_extends_beyond_the_box_and_has_short_edges() {
         let bounds = Box3 { lo: [0.0, -50.0, 3.0], hi: [4000.0, 50.0, 90.0] };
-        let level = GroundLevel { bounds, has_terrain: false, ground_m: 5.0 };
+        let mut level = GroundLevel { bounds, ..GroundLevel::new() };
+        level.add(Rank::Ground as u8, 5.0);
         let plane = plane(&level, &[bounds]);
         let all = || plane.iter().flat_map(|t| t.corners);
         assert_eq!(all().map(|c| c[0]).min(), Some(-200 * 4096));
@@ -149,7 +155,7 @@ mod tests {
 
     #[test]
     fn a_plane_needs_an_object() {
-        let level = GroundLevel { bounds: Box3 { lo: [0.0; 3], hi: [1.0; 3] }, has_terrain: false, ground_m: 0.0 };
+        let level = GroundLevel { bounds: Box3 { lo: [0.0; 3], hi: [1.0; 3] }, ..GroundLevel::new() };
         assert!(level.plane(1, 0, &mut std::iter::empty(), &mut Vec::new()).is_err());
     }
 
@@ -157,7 +163,7 @@ mod tests {
     fn a_very_large_plane_is_only_near_content() {
         let at = |x: f64| Box3 { lo: [x, x, 0.0], hi: [x + 500.0, x + 500.0, 9.0] };
         let bounds = Box3 { lo: [0.0; 3], hi: [9e6, 9e6, 9.0] };
-        let level = GroundLevel { bounds, has_terrain: false, ground_m: 0.0 };
+        let level = GroundLevel { bounds, ..GroundLevel::new() };
         let plane = plane(&level, &[at(0.0), at(4e6), at(9e6 - 500.0)]);
         assert!((30..200).contains(&plane.len()), "{}", plane.len());
         let is_under = |x: i64| plane.iter().any(|t| t.corners.iter().all(|c| (c[0] - x * 4096).abs() < 3000 * 4096));
@@ -167,7 +173,7 @@ mod tests {
     #[test]
     fn a_plane_under_content_everywhere_in_a_very_large_box_is_left_out() {
         let bounds = Box3 { lo: [0.0; 3], hi: [9e6, 9e6, 9.0] };
-        let level = GroundLevel { bounds, has_terrain: false, ground_m: 0.0 };
+        let level = GroundLevel { bounds, ..GroundLevel::new() };
         let mut out = Vec::new();
         assert!(!level.plane(1, 9, &mut [bounds].into_iter(), &mut out).expect("an id is given") && out.is_empty());
     }

@@ -55,11 +55,15 @@ pub(crate) fn instances(source: &TriangleSource, number: usize, prototypes: &Pro
             report.instances_of_nothing += 1;
             continue;
         };
-        if source.extent.is_some_and(|e| !e.keeps_point([3, 7, 11].map(|k| instance.transform[k]))) {
+        let Some(transform) = asset.mesh.placed(instance.object, &instance.transform) else {
+            report.adjusted_away += 1;
+            continue;
+        };
+        if source.extent.is_some_and(|e| !e.keeps_point([3, 7, 11].map(|k| transform[k]))) {
             report.outlier_triangles += 1;
             continue;
         }
-        let transform = to_local(&instance.transform, source.origin);
+        let transform = to_local(&transform, source.origin);
         let object_id = asset.ids[instance.object as usize];
         let content = instance_hash(content, object_id, &transform);
         out.push(InstanceRecord { prototype: *prototype, object_id, transform, content, reserved: 0 });

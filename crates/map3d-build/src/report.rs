@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use map3d_texture::TextureFault;
 use serde::{Deserialize, Serialize};
 
-/// Part of `scene.json`, and returned to the caller; contains every count, even 0, except for that of outliers.
+/// Part of `scene.json`, and returned to the caller; contains every count, even 0, except for those of outliers and adjustments.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct BuildReport {
@@ -34,6 +34,9 @@ pub struct BuildReport {
     /// Triangles and instances far from the rest that were left out.
     #[serde(skip_serializing_if = "is_zero")]
     pub outlier_triangles: u64,
+    /// Triangles and instances of objects that are left out by adjustments, or that others stand for.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub adjusted_away: u64,
     /// By reason, the number of images that failed and an example.
     pub texture_warnings: BTreeMap<String, String>,
     /// Why images cannot be used, by their keys in the assets.
@@ -53,6 +56,7 @@ impl BuildReport {
         self.materials_without_their_texture += asset.materials_without_their_texture;
         self.instances_of_nothing += asset.instances_of_nothing;
         self.outlier_triangles += asset.outlier_triangles;
+        self.adjusted_away += asset.adjusted_away;
     }
 
     /// Returns the counts by name.

@@ -54,8 +54,8 @@ pub(crate) fn summarize_asset(
     counts.materials_without_their_texture = source.materials.without_their_texture[number];
     let known = textures::used_sources(asset).into_iter().map(|s| SummaryTexture::new(s.clone(), textures.by_source.get(&s)));
     let (textures, materials) = (known.collect(), source.materials.hashes_of(number));
-    let levels = levels.into_iter().map(GroundLevel::to_bits).collect();
-    let details = AssetDetails { level: level.to_bits(), levels, counts, textures, materials, prototypes: files, ..AssetDetails::default() };
+    let levels = levels.iter().map(GroundLevel::to_document).collect();
+    let details = AssetDetails { level: level.to_document(), levels, counts, textures, materials, prototypes: files, ..AssetDetails::default() };
     Ok(AssetSummary { details, cells: Vec::new(), instances, ids: asset.ids.clone() })
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use map3d_base::asset::AssetMesh;
 use map3d_base::{KeptSpace, Vec3, vec3};
 use map3d_scene::lattice::{Point, snap};
 
@@ -38,31 +39,38 @@ impl TriangleSource<'_> {
         keep_going: &mut dyn FnMut(u64) -> bool,
     ) -> bool {
         let asset = self.assets[number];
-        let mut counters = TriangleCounters::new(asset.ids.len());
-        for (i, prototype) in asset.mesh.prototypes().iter().enumerate() {
-            if i % (1 << 16) == 0 && !keep_going(i as u64) {
-                return false;
+        let mut done = 0;
+        for mesh in asset.mesh.drawn() {
+            let mut counters = TriangleCounters::new(asset.ids.len());
+            for (i, prototype) in mesh.prototypes().iter().enumerate() {
+                if i % (1 << 16) == 0 && !keep_going(done + i as u64) {
+                    return false;
+                }
+                if i % TRIANGLES_PER_RELEASE == 0 {
+                    mesh.release();
+                }
+                let ordinal = counters.next(*prototype, mesh.objects()[i]);
+                if !wanted(*prototype) {
+                    continue;
+                }
+                report.triangles_read += 1;
+                let Some(mut t) = self.triangle(number, mesh, i, report) else { continue };
+                t.source = ordinal;
+                report.split_triangles += t.split(&mut |piece| out(*prototype, piece)) - 1;
             }
-            if i % TRIANGLES_PER_RELEASE == 0 {
-                asset.mesh.release();
-            }
-            let ordinal = counters.next(*prototype, asset.mesh.objects()[i]);
-            if !wanted(*prototype) {
-                continue;
-            }
-            report.triangles_read += 1;
-            let Some(mut t) = self.triangle(number, i, *prototype, report) else { continue };
-            t.source = ordinal;
-            report.split_triangles += t.split(&mut |piece| out(*prototype, piece)) - 1;
+            done += mesh.triangles().len() as u64;
         }
         true
     }
 
-    fn triangle(&self, number: usize, i: usize, prototype: u32, report: &mut BuildReport) -> Option<BuildTriangle> {
-        let asset = self.assets[number];
-        let mesh = &asset.mesh;
+    /// Returns a triangle of the mesh of an asset; `None` for one that is left out.
+    fn triangle(&self, number: usize, mesh: &AssetMesh, i: usize, report: &mut BuildReport) -> Option<BuildTriangle> {
+        let (asset, prototype) = (self.assets[number], mesh.prototypes()[i]);
         let origin = if prototype == 0 { self.origin } else { [0.0; 3] };
-        let corners = mesh.triangles()[i].map(|v| mesh.positions()[v as usize]);
+        let Some(corners) = mesh.corners(i) else {
+            report.adjusted_away += 1;
+            return None;
+        };
         if prototype == 0 && self.extent.is_some_and(|e| !e.keeps(corners)) {
             report.outlier_triangles += 1;
             return None;
@@ -77,7 +85,7 @@ impl TriangleSource<'_> {
         let t = BuildTriangle {
             corners,
             uv: mesh.uvs()[i],
-            normals: mesh.normals().get(i).map_or([[0; 3]; 3], |n| n.map(|c| c.map(snorm))),
+            normals: mesh.normals_of(i).map_or([[0; 3]; 3], |n| n.map(|c| c.map(snorm))),
             rank: mesh.ranks()[i].min(5),
             padding: 0,
             material,

@@ -2,7 +2,7 @@
 
 use crate::fixture::{Face, batch, bytes_of, new_folder, request, run, tent, tent_grid, world, write_asset, write_faces};
 use map3d_base::Error;
-use map3d_base::asset::{Instance, Material, Materials, Rank};
+use map3d_base::asset::{Adjustments, Instance, Material, Materials, Rank};
 use map3d_build::{BuildOptions, BuildRequest, GroundPlane, build_scene};
 use map3d_scene::{Chunk, SceneStore};
 
@@ -251,4 +251,72 @@ fn an_unknown_cluster_is_refused() {
     request.options.cluster = 2;
     let refused = build_scene(&folder.0, &request, &mut |_, _, _| true).expect_err("one cluster");
     assert!(refused.to_string().contains("cluster 2: the scene has 1 clusters"), "{refused}");
+}
+
+#[test]
+fn adjusted_objects_are_moved_and_left_out_as_if_imported_so() {
+    let (folder, other) = (new_folder(), new_folder());
+    let faces: Vec<Face> = (0..4).flat_map(|k| tent(f64::from(k) * 30.0, 0.0, k)).collect();
+    write_faces(&folder.0, &faces);
+    run(&folder, &request());
+    let before = bytes_of(&folder);
+    let asset = folder.0.join("assets/town");
+    let shifts = vec![0.0, 12.5, f64::NAN, -3.0];
+    Adjustments { scale: 1.0, shifts: shifts.clone() }.write(&asset).expect("write");
+    let report = run(&folder, &request());
+    assert_eq!((report.triangles, report.adjusted_away), (9, 3));
+    let moved = faces.iter().map(|(t, object, m, r)| (t.map(|p| [p[0], p[1], p[2] + shifts[*object as usize]]), *object, *m, *r));
+    write_faces(&other.0, &moved.filter(|(t, ..)| !t[0][2].is_nan()).collect::<Vec<_>>());
+    run(&other, &request());
+    let chunks = |f: &_| bytes_of(f).into_iter().filter(|(name, _)| name.ends_with("m3c")).collect::<Vec<_>>();
+    assert!(chunks(&folder) == chunks(&other));
+    std::fs::remove_file(asset.join(map3d_base::asset::ADJUSTMENTS_FILE)).expect("remove");
+    run(&folder, &request());
+    assert!(bytes_of(&folder) == before, "without adjustments, everything is as before");
+    Adjustments { scale: 1.0, shifts: vec![0.0] }.write(&asset).expect("write");
+    assert!(build_scene(&folder.0, &request(), &mut |_, _, _| true).is_err(), "they must be those of all objects");
+}
+
+#[test]
+fn instances_of_adjusted_objects_are_moved_and_left_out() {
+    let folder = new_folder();
+    let tree: Vec<Face> = vec![([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.0, 3.0]], 0, 0, Rank::Other)];
+    let at = |object: u32| Instance {
+        prototype: 1,
+        object,
+        transform: [1.0, 0.0, 0.0, 500_000.0 + f64::from(object), 0.0, 1.0, 0.0, 5_000_000.0, 0.0, 0.0, 1.0, 40.0],
+    };
+    let materials = Materials { materials: vec![Material::default()], instances: vec![at(0), at(1)] };
+    write_asset(&folder.0, "town", &[batch(&tree, 1)], materials);
+    Adjustments { scale: 0.5, shifts: vec![100.0, f64::NAN] }.write(&folder.0.join("assets/town")).expect("write");
+    let report = run(&folder, &request());
+    assert_eq!((report.instances, report.adjusted_away), (1, 1));
+    let store = SceneStore::open(&folder.0, 1 << 20).expect("open");
+    assert!((store.bounds().lo[2] - 120.0).abs() < 1e-6 && (store.bounds().hi[2] - 121.5).abs() < 1e-6, "{:?}", store.bounds());
+}
+
+#[test]
+fn a_house_far_below_the_others_does_not_lower_the_ground_plane() {
+    let folder = new_folder();
+    let square = |k: u32, z: f64| {
+        let p = |x: f64, y: f64| [f64::from(k) * 30.0 + x, y, z];
+        [[p(0.0, 0.0), p(8.0, 0.0), p(8.0, 8.0)], [p(0.0, 0.0), p(8.0, 8.0), p(0.0, 8.0)]].map(|t| (world(t), k, 0, Rank::Ground))
+    };
+    let mut faces: Vec<Face> = (0..30).flat_map(|k| square(k, f64::from(k % 5))).collect();
+    let mut wanted = request();
+    (wanted.options.ground_plane, wanted.ground_id) = (GroundPlane::On, 999);
+    let height = |folder: &_, faces: &[Face]| {
+        let folder: &crate::fixture::Folder = folder;
+        write_faces(&folder.0, faces);
+        run(folder, &wanted);
+        let store = SceneStore::open(&folder.0, 1 << 20).expect("open");
+        let heights = (0..store.parts().len() as u32).flat_map(|k| {
+            let chunk = store.chunk(k).expect("chunk");
+            chunk.objects().iter().filter(|o| o.id == 999).map(|o| chunk.origin()[2] + f64::from(o.bounds[2])).collect::<Vec<f64>>()
+        });
+        heights.fold(f64::INFINITY, f64::min)
+    };
+    assert_eq!(height(&folder, &faces), 0.0);
+    faces.extend(square(30, -520.0));
+    assert_eq!(height(&folder, &faces), 0.0);
 }

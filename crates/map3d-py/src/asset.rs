@@ -169,7 +169,12 @@ impl AssetMesh {
         PyArray1::from_slice(py, self.0.prototypes())
     }
 
-    /// Boxes of `count` objects in world coordinates, without placed prototypes, and of each prototype in its own frame; None if there is no
+    /// The transform of an instance of an object as drawn; None if the object is left out.
+    fn placed(&self, object: u32, transform: [f64; 12]) -> Option<[f64; 12]> {
+        self.0.placed(object, &transform)
+    }
+
+    /// Boxes of `count` objects as drawn, in world coordinates, without placed prototypes, and of each prototype in its own frame; None if there is no
     /// geometry. With an extent (JSON of `find_clusters`), boxes of what is in it, and for each object the number of triangles that are not.
     #[pyo3(signature = (count, extent=None))]
     fn boxes(&self, py: Python<'_>, count: usize, extent: Option<&str>) -> PyResult<Boxes> {

@@ -6,6 +6,7 @@ mod batch;
 mod block;
 mod build_scene;
 mod codec;
+mod coherence;
 mod content;
 mod errors;
 mod files;
@@ -46,6 +47,8 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<batch::Batch>()?;
     m.add_class::<asset::AssetWriter>()?;
     m.add_class::<asset::AssetMesh>()?;
+    m.add_class::<coherence::Survey>()?;
+    m.add_class::<coherence::Surface>()?;
     m.add_class::<reader::Reader>()?;
     m.add_class::<formats::FileFinder>()?;
     m.add_class::<frame::LayerSpec>()?;
@@ -56,6 +59,10 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(build_scene::build_scene, m)?)?;
     m.add_function(wrap_pyfunction!(build_scene::find_damaged_images, m)?)?;
     m.add_function(wrap_pyfunction!(content::find_clusters, m)?)?;
+    m.add_function(wrap_pyfunction!(coherence::surface_heights, m)?)?;
+    m.add_function(wrap_pyfunction!(coherence::drape_objects, m)?)?;
+    m.add_function(wrap_pyfunction!(coherence::write_adjustments, m)?)?;
+    m.add_function(wrap_pyfunction!(coherence::read_adjustments, m)?)?;
     m.add_function(wrap_pyfunction!(block::reduce_block, m)?)?;
     m.add_function(wrap_pyfunction!(block::check_seam, m)?)?;
     m.add_function(wrap_pyfunction!(files::check_file, m)?)?;

@@ -1,7 +1,7 @@
 """The records of the catalogue, as plain values."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -14,6 +14,8 @@ from map3d.types import BlockId, BlockKind, Box, Layer, Vec3
 
 LOCAL_CRS_NAME = "local metres"
 WINDOW = "window"
+HEIGHTS_DIFFER: Final = "heights_differ"
+"""Key in `SceneRecord.options` of scenes whose files do not share the height system of the scene."""
 FENCES_PER_VERSION: Final = 1 << 20
 """New jobs start with this times the content version, so that after --regrid no job gets a fence that an earlier job of the same block had."""
 
@@ -46,6 +48,14 @@ class SceneCrs:
             return "of an unknown height system"
         return self.vertical if self.vertical_epsg is None else f"{self.vertical} (EPSG:{self.vertical_epsg})"
 
+    @property
+    def without_heights(self) -> "SceneCrs":
+        """The horizontal part alone."""
+        from map3d.geometry.crs import horizontal_crs, parse_crs
+
+        wkt = None if self.wkt is None else horizontal_crs(parse_crs(self.wkt)).to_wkt("WKT2_2019")
+        return replace(self, wkt=wkt, vertical=None)
+
 
 @dataclass(frozen=True)
 class SceneRecord:
@@ -61,6 +71,11 @@ class SceneRecord:
     origin: Vec3 | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     built: str | None = None
+
+    @property
+    def stated_crs(self) -> SceneCrs | None:
+        """What may be stated of `crs`: without a height system that not all files share."""
+        return self.crs if self.crs is None or not self.options.get(HEIGHTS_DIFFER) else self.crs.without_heights
 
 
 @dataclass(frozen=True)

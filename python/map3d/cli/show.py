@@ -57,8 +57,8 @@ def _scene(catalogue: Catalogue, name: str, as_json: bool) -> None:
         print_json({"scene": scene, "assets": assets})
         return
     click.echo(f"{name}: {scene.crs.name if scene.crs else 'no coordinate system yet'}, {_origin_text(scene.origin)}")
-    if scene.crs is not None:
-        click.echo(f"heights: {scene.crs.heights_text}")
+    if (crs := scene.stated_crs) is not None:
+        click.echo(f"heights: {crs.heights_text}")
     click.echo(f"options: {', '.join(map(_option_text, scene.options.items()))}")
     print_table(
         ("asset", "format", "objects", "triangles", "source"),

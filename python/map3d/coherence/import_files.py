@@ -1,16 +1,19 @@
 """Imports files and folders into a scene, one source document after another; a broken file is reported and skipped."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from map3d.catalogue import AssetRecord, Catalogue, Workspace
 from map3d.catalogue.scene_lock import scene_lock
+from map3d.coherence.check import check_scene, choose_heights
+from map3d.coherence.photo_ground import ground_change, photo_ground
 from map3d.coherence.plan import plan_import
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.formats.raster import RASTER
 from map3d.ingest.asset_removal import removed_files
 from map3d.ingest.file_notes import HEIGHTS_ALONE, FileNote
+from map3d.ingest.ground_grid import GroundGrid
 from map3d.ingest.import_inputs import import_inputs
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported, OnlyGrids, import_file, workspace_key
@@ -53,12 +56,16 @@ def import_files(
     a single file also the errors of `import_file`.
     """
     catalogue.scene(scene)
+    choose_heights(catalogue, scene, options.heights, options.clamp)
     with unpacked(workspace, scene, files, progress or (lambda *_: None)) as found:
         virtual = [path for path in files if options.virtual_rasters and path in found.paths]
         done = _import_files(workspace, catalogue, scene, found, virtual, options, progress)
+        check_scene(workspace, catalogue, scene)
+        reports = {asset.name: asset.report for asset in catalogue.assets(scene)}
         failed = [(found.original(path), reason.map_texts(found.original)) for path, reason in done.failed]
         ignored = [(found.original(path), note) for path, note in done.ignored]
-        return FilesImport(done.imported, done.unchanged, failed, ignored)
+        imported = [replace(item, report=reports.get(item.asset, item.report)) for item in done.imported]
+        return FilesImport(imported, done.unchanged, failed, ignored)
 
 
 def _import_files(
@@ -105,11 +112,12 @@ def _import_files(
             number += 1
             chosen = plan.options(source, options)
             try:
-                if _is_unchanged(known.get(source.name), source, chosen):
+                ground = photo_ground(workspace, catalogue, scene) if source.format == RASTER.name else None
+                if _is_unchanged(known.get(source.name), source, chosen, ground):
                     result.unchanged.append(source.name)
                     grids.collect(known[source.name].report.get("grids", ()))
                 else:
-                    done = import_file(workspace, catalogue, scene, source, chosen, show, parser=parser)
+                    done = import_file(workspace, catalogue, scene, source, chosen, show, parser=parser, ground=ground)
                     result.imported.append(done)
                     grids.collect(done.report.get("grids", ()))
             except OnlyGrids as found:
@@ -140,8 +148,8 @@ def _known_assets(workspace: Workspace, catalogue: Catalogue, scene: str) -> dic
     return {asset.name: asset for asset in catalogue.assets(scene)}
 
 
-def _is_unchanged(asset: AssetRecord | None, source: SourceDocument, options: ImportOptions) -> bool:
-    return asset is not None and import_inputs(source, options).changes(asset) is None
+def _is_unchanged(asset: AssetRecord | None, source: SourceDocument, options: ImportOptions, ground: GroundGrid | None) -> bool:
+    return asset is not None and import_inputs(source, options).changes(asset) is None and ground_change(asset, ground) is None
 
 
 def _show(progress: OnFile | None, name: str, number: int, total: int) -> Callable[[Message | None], None]:

@@ -30,23 +30,38 @@ def read_objects(folder: Path) -> list[dict[str, Any]]:
 
 
 def world_boxes(folder: Path, count: int, extent: ContentExtent | None = None) -> list[Box | None]:
-    """Returns the box of each of `count` objects in world coordinates, placed prototypes included, or None. With an extent, the boxes
+    """Returns the box of each of `count` objects as drawn, in world coordinates, placed prototypes included, or None. With an extent, the boxes
     of what is in it."""
     return boxes_within(folder, count, extent)[0]
 
 
 def boxes_within(folder: Path, count: int, extent: ContentExtent | None) -> tuple[list[Box | None], list[int]]:
     """Returns the box of each object, and the number of its triangles and placed prototypes outside the extent."""
-    boxes, prototypes, outside = _core.AssetMesh(str(folder / "mesh.m3a")).boxes(count, None if extent is None else extent.text)
+    mesh = _core.AssetMesh(str(folder / "mesh.m3a"))
+    boxes, prototypes, outside = mesh.boxes(count, None if extent is None else extent.text)
     instances = json.loads((folder / "materials.json").read_text(encoding="utf-8")).get("instances", [])
     for instance in instances:
-        place = (instance["transform"][3], instance["transform"][7], instance["transform"][11])
+        transform = mesh.placed(instance["object"], instance["transform"])
+        if transform is None:
+            continue
+        place = (transform[3], transform[7], transform[11])
         if extent is not None and not extent.keeps_point(place):
             outside[instance["object"]] += 1
             continue
-        placed = _moved(prototypes.get(instance["prototype"]), instance["transform"])
+        placed = _moved(prototypes.get(instance["prototype"]), transform)
         boxes[instance["object"]] = unite_boxes(boxes[instance["object"]], placed)
     return boxes, outside
+
+
+def left_out(folder: Path, count: int) -> NDArray[np.int64]:
+    """Returns the numbers of the objects that adjustments leave out; draped ones are not among them."""
+    adjustments = _core.read_adjustments(str(folder))
+    if adjustments is None:
+        return np.empty(0, dtype=np.int64)
+    drawn = np.zeros(count, dtype=bool)
+    if (folder / "draped.m3a").exists():
+        drawn[_core.AssetMesh(str(folder / "draped.m3a")).objects] = True
+    return np.flatnonzero(np.isnan(adjustments[1]) & ~drawn)
 
 
 def new_objects(lines: list[dict[str, Any]], boxes: list[Box | None], origin: Vec3) -> list[NewObject]:

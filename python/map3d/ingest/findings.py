@@ -9,6 +9,9 @@ from map3d.messages import Message, message, table
 MAX_NAMED_FILES: Final = 5
 """Files that a finding names."""
 
+CONTRADICTIONS: Final = "contradictions"
+"""Member of a report: what the check of coherence says of the file, which depends on the other files of the scene."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -74,13 +77,14 @@ def finding(code: str, count: int, example: str = "", **values: Any) -> dict[str
 
 def findings(report: Mapping[str, Any]) -> list[Finding]:
     """Returns the findings of a report, whole files first. A report of an older version of map3d has texts, which stay as they are."""
-    found = [Finding(Message(item["code"], item.get("values", {})), item["count"], str(item["example"])) for item in report.get("findings", ())]
+    items = [*report.get("findings", ()), *report.get(CONTRADICTIONS, ())]
+    found = [Finding(Message(item["code"], item.get("values", {})), item["count"], str(item["example"])) for item in items]
     return sorted([*found, *_earlier(report)], key=lambda item: item.order)
 
 
 def report_document(report: Mapping[str, Any]) -> dict[str, Any]:
     """Returns a report for programs: the findings have their English text, also those of older reports."""
-    rest = {name: value for name, value in report.items() if name not in ("skipped", "warnings")}
+    rest = {name: value for name, value in report.items() if name not in ("skipped", "warnings", CONTRADICTIONS)}
     return {**rest, "findings": [item.document for item in findings(report)]}
 
 

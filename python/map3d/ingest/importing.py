@@ -5,7 +5,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +19,7 @@ from map3d.ingest.asset import asset_digest, new_objects, put_in_place, read_obj
 from map3d.ingest.content import find_content
 from map3d.ingest.file_notes import HEIGHTS_ALONE
 from map3d.ingest.findings import findings
+from map3d.ingest.ground_grid import GroundGrid
 from map3d.ingest.import_checkpoints import checkpoints_key, import_checkpoints
 from map3d.ingest.import_inputs import ImportInputs, import_inputs
 from map3d.ingest.import_options import ImportOptions
@@ -75,10 +76,11 @@ def import_file(
     *,
     parser: ParserProcess | None = None,
     entry: str | None = None,
+    ground: GroundGrid | None = None,
 ) -> Imported:
     """Adds a source document to a scene, or replaces the asset of the same name. The report counts partial failures.
 
-    `parser`: a subprocess to reuse for many files; by default a new one parses this file.
+    `parser`: a subprocess to reuse for many files; by default a new one parses this file. `ground`: below a photo without elevation model.
 
     Raises ImportFailed (nothing usable, or the first fault under `strict`), OnlyGrids, LimitExceeded, CrsError. Until the last step the scene is
     unchanged.
@@ -91,9 +93,10 @@ def import_file(
     shutil.rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
     try:
-        with _checkpoints(record, source, final, inputs) as checkpoints:
+        with _checkpoints(record, source, final, inputs, ground) as checkpoints:
             with parser or ParserProcess() as running:
-                parsed = _parse(record, source, options, draft, checkpoints, progress, running, entry or find_format(source.format).parser)
+                parse = partial(_parse, record, source, options, draft, checkpoints, progress, running)
+                parsed = parse(entry or find_format(source.format).parser, ground)
             report = parsed["report"]
             if not report["triangles"] and report.get("grids"):
                 raise OnlyGrids(message("about", what=str(source.paths[0]), message=message(HEIGHTS_ALONE)), report["grids"])
@@ -107,13 +110,16 @@ def import_file(
         shutil.rmtree(draft, ignore_errors=True)
 
 
-def _checkpoints(record: SceneRecord, source: SourceDocument, final: Path, inputs: ImportInputs) -> AbstractContextManager[Path | None]:
+def _checkpoints(
+    record: SceneRecord, source: SourceDocument, final: Path, inputs: ImportInputs, ground: GroundGrid | None
+) -> AbstractContextManager[Path | None]:
     """Returns the folder for the checkpoints of an import; None for a format that is imported as a whole."""
     if not find_format(source.format).has_checkpoints:
         return nullcontext()
     options = {name: value for name, value in inputs.options.items() if name not in _NOT_IN_PIECES}
     paths = [str(path.absolute()) for path in source.places or source.paths]
     key = {"files": inputs.files, "paths": paths, "options": options, "reader": inputs.reader, "scene_crs": _crs_text(record.crs)}
+    key |= {} if ground is None else {"ground": ground.digest}
     return import_checkpoints(final, checkpoints_key(key))
 
 
@@ -126,6 +132,7 @@ def _parse(
     progress: OnProgress | None,
     parser: ParserProcess,
     entry: str,
+    ground: GroundGrid | None,
 ) -> dict[str, Any]:
     limits = options.limits(source.data_paths, source.format)
     request = {
@@ -143,6 +150,7 @@ def _parse(
         "cores": usable_cores(),
         "grids": {str(path.absolute()): grid for path, grid in source.grids.items()},
         "place": _place(source),
+        "ground": None if ground is None else ground.document,
         "virtual": {str(path.absolute()): str(folder.absolute()) for path, folder in source.virtual_folders.items()},
     }
     shown = ImportProgress()

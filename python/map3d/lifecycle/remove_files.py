@@ -6,6 +6,7 @@ from pathlib import Path
 
 from map3d.catalogue import AssetRecord, Catalogue, Workspace
 from map3d.catalogue.scene_lock import scene_lock
+from map3d.coherence.check import FILE as CHECK
 from map3d.errors import BadRequest, NotFound
 from map3d.ingest.asset_removal import finish_removal, remove_assets, remove_folder
 from map3d.ingest.unfinished_imports import finish_imports
@@ -63,7 +64,7 @@ def is_built(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:
 def remove_built_files(workspace: Workspace, scene: str) -> None:
     """Removes everything that a build made, the index first, so that the rest is never taken for a built scene. The caller holds the scene's lock."""
     folder = workspace.scene_folder(scene)
-    for name in ("scene.json", "instances.m3i", OUTLIERS):
+    for name in ("scene.json", "instances.m3i", OUTLIERS, CHECK):
         (folder / name).unlink(missing_ok=True)
     for name in ("chunks", "build", "textures"):
         remove_folder(folder / name)

@@ -114,7 +114,7 @@ def _base_bits(results: Iterable[tuple[BlockId, JobResult]], root: int) -> Itera
 
 
 def _crs(scene: SceneRecord) -> ManifestCrs:
-    crs = scene.crs
+    crs = scene.stated_crs
     return ManifestCrs(LOCAL_CRS_NAME) if crs is None else ManifestCrs(crs.name, crs.epsg, crs.wkt, crs.vertical, crs.heights, crs.vertical_epsg)
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Final, Literal, NamedTuple, get_args
 
+from map3d.requests.heights import HeightChoice
 from map3d.requests.param import param
 
 Axes = Literal["auto", "east-north", "north-east"]
@@ -121,7 +122,7 @@ class ReadLimits:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AddFiles(FormatOptions, ReadLimits):
+class AddFiles(FormatOptions, HeightChoice, ReadLimits):
     """Imports files into a scene."""
 
     crs: str | None = crs_param()
@@ -139,7 +140,7 @@ class AddFiles(FormatOptions, ReadLimits):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Inspect(FormatOptions, ReadLimits):
+class Inspect(FormatOptions, HeightChoice, ReadLimits):
     """Says what files hold."""
 
     crs: str | None = crs_param()

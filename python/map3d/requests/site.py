@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from map3d.geometry.views import DEFAULT_PITCH_DEG, views_around
+from map3d.requests.heights import HeightChoice
 from map3d.requests.param import param
 from map3d.requests.reading import FormatOptions, crs_param
 from map3d.requests.renderings import DEFAULT_DIRECTIONS, color_param, data_param, res_param, small_param
@@ -12,7 +13,7 @@ from map3d.types import DEFAULT_DATA, DataEncoding, ViewAngles
 
 
 @dataclass(frozen=True, kw_only=True)
-class Site(FormatOptions, ContentChoice, WorkLimits):
+class Site(FormatOptions, HeightChoice, ContentChoice, WorkLimits):
     """Turns all files of a folder into a static web site."""
 
     folder: Path = param(help="Folder of the files.", argument=True)

@@ -8,7 +8,10 @@ from typing import Any, Final
 
 from map3d import _core
 from map3d.catalogue import Catalogue, SceneRecord, Workspace
+from map3d.catalogue.records import HEIGHTS_DIFFER
 from map3d.catalogue.scene_lock import scene_lock
+from map3d.coherence import check
+from map3d.coherence.check import check_locked_scene, is_checked
 from map3d.cores import usable_cores
 from map3d.errors import BadRequest
 from map3d.ingest.asset_removal import is_removing
@@ -29,6 +32,9 @@ OPTIONS: Final[Mapping[str, Any]] = {
     "drop_untextured": False,
     "ground_plane": "auto",
 }
+_CHECKED: Final = (check.HEIGHTS, check.CLAMP)
+_NOT_OF_BUILDS: Final = (FILES, HEIGHTS_DIFFER, *_CHECKED)
+"""Options of scenes on which a build does not depend, or by way of the check of coherence alone."""
 GROUND: Final = "ground"
 BUILD_BYTES: Final = 2 << 30
 """Default memory limit of a build."""
@@ -42,6 +48,8 @@ def is_stale(workspace: Workspace, catalogue: Catalogue, scene: str) -> bool:
     if record.built != scene_digest(catalogue, record):
         return True
     folder = workspace.scene_folder(scene)
+    if has_assets(folder) and not is_checked(workspace, catalogue, record):
+        return True
     return (FILES not in record.options or has_assets(folder)) and not (folder / "scene.json").is_file()
 
 
@@ -60,8 +68,9 @@ def build(
         folder = workspace.scene_folder(scene)
         if not has_assets(folder):
             raise BadRequest(f"scene {scene}: its files were imported on another host; build it there with map3d render")
+        check_locked_scene(workspace, catalogue, scene)
         options = _build_options(record)
-        check = OutlierCheck(workspace, record, assets, options)
+        outlier_check = OutlierCheck(workspace, record, assets, options)
         with Registry(workspace.registry_path(scene)) as registry:
             ground = registry.get_or_create_scene_object(GROUND, "terrain")
             request = {
@@ -72,7 +81,7 @@ def build(
                 "threads": threads,
             }
             report = build_in_subprocess(scene, folder, request, max_memory_bytes, progress)
-            outliers = check.finish(registry)
+            outliers = outlier_check.finish(registry)
             report_texture_faults(workspace, catalogue, scene, report.pop("texture_faults", {}))
             has_ground = report.get("ground_plane_triangles")
             registry.set_scene_object(ground, open_scene(workspace, scene).object_box(ground) if has_ground else None)
@@ -102,13 +111,14 @@ def build_if_stale(
 def scene_digest(catalogue: Catalogue, record: SceneRecord) -> str:
     """Returns a digest of everything that a build depends on."""
     assets = [(asset.name, asset.digest) for asset in catalogue.assets(record.name)]
-    text = json.dumps([assets, record.origin, _build_options(record), _core.__version__, _core.SCENE_VERSIONS], sort_keys=True)
+    checked = [check.VERSION, *(record.options.get(name) for name in _CHECKED)]
+    text = json.dumps([assets, record.origin, _build_options(record), _core.__version__, _core.SCENE_VERSIONS, checked], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def _build_options(record: SceneRecord) -> dict[str, Any]:
-    """Returns the options that a build depends on."""
-    return {**OPTIONS, **{name: value for name, value in record.options.items() if name != FILES}}
+    """Returns the options of the build itself."""
+    return {**OPTIONS, **{name: value for name, value in record.options.items() if name not in _NOT_OF_BUILDS}}
 
 
 def open_scene(workspace: Workspace, scene: str, cache_bytes: int = 64 << 20) -> _core.Scene:

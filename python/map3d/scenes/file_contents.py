@@ -1,5 +1,6 @@
 """What a scene has of each of its files: coordinate system, place, extent, objects by class, textures, and what was skipped."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,9 +32,11 @@ class Rasters:
 
 @dataclass(frozen=True)
 class FileContents:
-    """`source`: name of the file, or of the first raster of a terrain; `rasters`: their number, None for other formats. `crs`: name of the CRS of the
-    coordinates in the file; `place`: where the file lies. `box`: world coordinates of the scene, None if empty. `outside`: triangles left out
-    of a built scene, since they lie far from the rest. `bytes`: of the file at its import. `textures`: None for a file that names no images."""
+    """`source`: name of the file, or of the first raster of a terrain, with folders where several have that name; `rasters`: their number, None for
+    other formats. `crs`: name of the CRS of the coordinates in the file; `place`: where the file lies. `box`: world coordinates of the scene, None if
+    empty. `outside`: triangles left out of a built scene, since they lie far from the rest. `bytes`: of the file at its import.
+
+    `textures`: None for a file that names no images."""
 
     asset: str
     source: str
@@ -69,9 +72,21 @@ def file_contents(workspace: Workspace, catalogue: Catalogue, scene: str) -> lis
     with Registry(workspace.registry_path(scene)) as registry:
         boxes = {name: _to_world(summary.box, origin) for name, summary in registry.asset_summaries().items()}
         kinds = registry.asset_kinds()
+    assets = catalogue.assets(scene)
+    labels = _labels([Path(asset.source) for asset in assets])
     return [
-        _contents(asset, boxes.get(asset.name), tuple(kinds.get(asset.name, ())), outside.get(asset.name, 0)) for asset in catalogue.assets(scene)
+        replace(_contents(asset, boxes.get(asset.name), tuple(kinds.get(asset.name, ())), outside.get(asset.name, 0)), source=label)
+        for asset, label in zip(assets, labels, strict=True)
     ]
+
+
+def _labels(paths: Sequence[Path]) -> list[str]:
+    """Returns the names of files, with as many of their folders as tell those of one name apart."""
+    labels = {path: path.name for path in paths}
+    for depth in range(2, max((len(path.parts) for path in labels), default=0) + 1):
+        counts = Counter(labels.values())
+        labels |= {path: "/".join(path.parts[-depth:]) for path, label in labels.items() if counts[label] > 1}
+    return [labels[path] for path in paths]
 
 
 def union(boxes: Sequence[Box | None]) -> Box | None:

@@ -50,7 +50,7 @@ def inspect_files(paths: Sequence[Path], options: ImportOptions, progress: OnFil
             report_damaged_images(workspace, catalogue, _SCENE)
             files = tuple(file_contents(workspace, catalogue, _SCENE))
             left_out = read_outliers(workspace, _SCENE)
-            crs = catalogue.scene(_SCENE).crs
+            crs = catalogue.scene(_SCENE).stated_crs
     box = union([file.box for file in files])
     return Inspection(crs, box, files, clusters, tuple(imported.failed), tuple(imported.ignored), left_out)
 

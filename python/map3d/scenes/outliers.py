@@ -11,7 +11,7 @@ import numpy as np
 from map3d import _core
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
 from map3d.errors import BadRequest
-from map3d.ingest.asset import boxes_within, read_objects
+from map3d.ingest.asset import boxes_within, left_out, read_objects
 from map3d.ingest.content import CLUSTER, KEEP_OUTLIERS, Cluster, Content, ContentExtent, find_content
 from map3d.registry import Registry
 from map3d.types import Box, Vec3
@@ -107,6 +107,7 @@ class OutlierCheck:
         all_boxes, _ = boxes_within(folder, len(ids), None)
         boxes, outside = boxes_within(folder, len(ids), extent)
         absent = {number for number, whole, kept in zip(ids, all_boxes, boxes, strict=True) if whole is not None and kept is None}
+        absent |= {ids[number] for number in left_out(folder, len(ids)).tolist()}
         local = {number: _local(box, self.scene.origin) for number, box in zip(ids, boxes, strict=True)}
         registry.set_boxes(asset.name, local, absent)
         left = [k for k, count in enumerate(outside) if count]

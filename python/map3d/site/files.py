@@ -8,6 +8,8 @@ from pathlib import Path
 
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
+from map3d.coherence.check import NO_CLASSES, check_scene, choose_heights
+from map3d.coherence.photo_ground import ground_change, photo_ground
 from map3d.coherence.plan import ImportPlan, plan_import
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
 from map3d.formats.raster import RASTER
@@ -24,6 +26,7 @@ from map3d.ingest.unpacked_archives import UnpackedFiles, unpacked
 from map3d.lifecycle.remove_files import remove_built_files
 from map3d.lifecycle.remove_scene import finish_scene_removal
 from map3d.messages import Message, message, verbatim
+from map3d.requests.heights import BY_EVIDENCE
 
 OnSource = Callable[[str, int, int, Message | None], None]
 """Called with the name of the current file, the number of files done, and of all, and what was read of the file so far."""
@@ -65,8 +68,11 @@ def update_files(workspace: Workspace, catalogue: Catalogue, files: SiteFiles, r
         catalogue.create_scene(files.scene)
     with scene_lock(workspace, files.scene.name):
         finish_imports(workspace, catalogue, files.scene.name)
+    choose_heights(catalogue, files.scene.name, files.options.heights or BY_EVIDENCE, files.options.clamp or (NO_CLASSES,))
     with unpacked(workspace, files.scene.name, [files.folder], report) as found:
-        return _Update(workspace, catalogue, files, found).run(report)
+        summary = _Update(workspace, catalogue, files, found).run(report)
+    check_scene(workspace, catalogue, files.scene.name)
+    return summary
 
 
 class _Update:
@@ -180,15 +186,17 @@ class _Update:
 
     def _import_if_changed(self, source: SourceDocument, parser: ParserProcess, show: OnProgress) -> None:
         asset, options = self._assets.get(source.name), self._plan.options(source, self._files.options)
+        scene = self._files.scene.name
         try:
             reason = None
+            ground = photo_ground(self._workspace, self._catalogue, scene) if source.format == RASTER.name else None
             if asset is not None:
-                reason = import_inputs(source, options).changes(asset)
+                reason = import_inputs(source, options).changes(asset) or ground_change(asset, ground)
                 if reason is None:
                     self._keep(asset, source)
                     self._grids.collect(asset.report.get("grids", ()))
                     return
-            done = import_file(self._workspace, self._catalogue, self._files.scene.name, source, options, show, parser=parser)
+            done = import_file(self._workspace, self._catalogue, scene, source, options, show, parser=parser, ground=ground)
             self._grids.collect(done.report.get("grids", ()))
         except OnlyGrids as found:
             self._grids.collect(found.grids)

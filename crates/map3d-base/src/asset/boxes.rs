@@ -13,7 +13,7 @@ const PIECE: usize = 1 << 20;
 /// Boxes of an asset's geometry; empty without geometry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshBoxes {
-    /// Boxes of the objects, in world coordinates, without placed prototypes.
+    /// Boxes of the objects as drawn, in world coordinates, without placed prototypes.
     pub objects: Vec<Box3>,
     /// Boxes of the prototypes by number, each in its own frame.
     pub prototypes: BTreeMap<u32, Box3>,
@@ -26,8 +26,16 @@ impl AssetMesh {
     /// Fails for a triangle of an object ≥ `count`.
     pub fn boxes(&self, count: usize, extent: Option<&KeptSpace>) -> Result<MeshBoxes> {
         let mut boxes = MeshBoxes { objects: vec![Box3::EMPTY; count], prototypes: BTreeMap::new(), outside: vec![0; count] };
-        let (triangles, objects, prototypes, positions) = (self.triangles(), self.objects(), self.prototypes(), self.positions());
-        for (t, corners) in triangles.iter().enumerate() {
+        self.drawn().try_for_each(|mesh| mesh.add_boxes(extent, &mut boxes))?;
+        Ok(boxes)
+    }
+
+    fn add_boxes(&self, extent: Option<&KeptSpace>, boxes: &mut MeshBoxes) -> Result<()> {
+        let (objects, prototypes, count) = (self.objects(), self.prototypes(), boxes.objects.len());
+        for t in 0..self.triangles().len() {
+            if t % PIECE == PIECE - 1 {
+                self.release();
+            }
             let bounds = match prototypes[t] {
                 0 => boxes.objects.get_mut(objects[t] as usize),
                 k => Some(boxes.prototypes.entry(k).or_insert(Box3::EMPTY)),
@@ -35,17 +43,14 @@ impl AssetMesh {
             let Some(bounds) = bounds else {
                 return Err(Error::format(self.path(), format!("triangle {t} belongs to object {}, of {count}", objects[t])));
             };
-            let corners = corners.map(|v| positions[v as usize]);
+            let Some(corners) = self.corners(t) else { continue };
             if prototypes[t] == 0 && extent.is_some_and(|e| !e.keeps(corners)) {
                 boxes.outside[objects[t] as usize] += 1;
             } else {
                 corners.iter().for_each(|p| bounds.add_point(*p));
             }
-            if t % PIECE == PIECE - 1 {
-                self.release();
-            }
         }
         self.release();
-        Ok(boxes)
+        Ok(())
     }
 }

@@ -1,9 +1,10 @@
-//! Maps `mesh.m3a` (spec/scene.md).
+//! Maps `mesh.m3a` (spec/scene.md), with the adjustments beside it.
 
 use std::path::{Path, PathBuf};
 
 use memmap2::Mmap;
 
+use super::Adjustments;
 use crate::error::{Error, Result};
 use crate::file::{self, HEADER_BYTES, aligned};
 use crate::vec3::Vec3;
@@ -13,7 +14,10 @@ pub const MESH_VERSION: u32 = 1;
 pub(super) const FLAG_NORMALS: u32 = 1;
 pub(super) const SECTIONS: [&str; 8] = ["positions", "triangles", "uvs", "normals", "material", "object", "rank", "prototype"];
 
-/// A mapped asset mesh; every vertex index is in range.
+/// The mesh of objects that are draped over the ground, beside that of their asset.
+pub const DRAPED_FILE: &str = "draped.m3a";
+
+/// A mapped asset mesh; every vertex index is in range. Its arrays are as imported, `corners` and `placed` as drawn.
 pub struct AssetMesh {
     path: PathBuf,
     map: Mmap,
@@ -21,11 +25,23 @@ pub struct AssetMesh {
     triangles: usize,
     /// Byte offset of each of `SECTIONS`; `normals` may be absent.
     offsets: [Option<usize>; 8],
+    adjustments: Option<Adjustments>,
+    draped: Option<Box<Self>>,
 }
 
 impl AssetMesh {
-    /// Maps and validates a `mesh.m3a`, including its checksum.
+    /// Maps and validates a `mesh.m3a`, including its checksum, and reads the adjustments beside it.
     pub fn open(path: &Path) -> Result<Self> {
+        let mut mesh = Self::open_alone(path)?;
+        if let Some(folder) = path.parent() {
+            mesh.adjustments = Adjustments::read(folder)?;
+            let draped = folder.join(DRAPED_FILE);
+            mesh.draped = draped.exists().then(|| Self::open_alone(&draped).map(Box::new)).transpose()?;
+        }
+        Ok(mesh)
+    }
+
+    fn open_alone(path: &Path) -> Result<Self> {
         let map = file::map(path)?;
         file::check_mapped(path, &map, MESH_MAGIC, MESH_VERSION)?;
         let count = |at: usize| usize::try_from(u64::from_le_bytes(map[at..at + 8].try_into().expect("8 bytes")));
@@ -48,13 +64,42 @@ impl AssetMesh {
         if at != map.len() {
             return Err(Error::format(path, format!("{} bytes, expected {at}", map.len())));
         }
-        let mesh = Self { path: path.to_path_buf(), map, vertices, triangles, offsets };
+        let mesh = Self { path: path.to_path_buf(), map, vertices, triangles, offsets, adjustments: None, draped: None };
         mesh.validate()?;
         Ok(mesh)
     }
 
     pub fn path(&self) -> &Path {
         &self.path
+    }
+
+    pub fn adjustments(&self) -> Option<&Adjustments> {
+        self.adjustments.as_ref()
+    }
+
+    /// Returns the meshes that are drawn: this one and, if objects are draped over the ground, the one that stands for them.
+    pub fn drawn(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(self.draped.as_deref())
+    }
+
+    /// Returns the corners of a triangle as drawn, those of a prototype in its own frame; `None` if its object is left out.
+    pub fn corners(&self, t: usize) -> Option<[Vec3; 3]> {
+        let corners = self.triangles()[t].map(|v| self.positions()[v as usize]);
+        let Some(adjustments) = self.adjustments.as_ref().filter(|_| self.prototypes()[t] == 0) else { return Some(corners) };
+        let object = self.objects()[t];
+        let [a, b, c] = corners.map(|p| adjustments.place(object, p));
+        Some([a?, b?, c?])
+    }
+
+    /// Returns the transform of an instance of an object as drawn; `None` if the object is left out.
+    pub fn placed(&self, object: u32, transform: &[f64; 12]) -> Option<[f64; 12]> {
+        self.adjustments.as_ref().map_or(Some(*transform), |a| a.place_instance(object, transform))
+    }
+
+    /// Returns the normals of a triangle as drawn; `None` when the asset has none.
+    pub fn normals_of(&self, t: usize) -> Option<[[f32; 3]; 3]> {
+        let normals = *self.normals().get(t)?;
+        Some(self.adjustments.as_ref().map_or(normals, |a| normals.map(|n| a.turn_normal(n))))
     }
 
     /// Drops the mesh's resident pages; they are re-read on access.

@@ -1,5 +1,6 @@
 //! Assets: the batches that a reader yields, and the files of an asset folder (spec/scene.md).
 
+mod adjustments;
 mod boxes;
 mod mapped;
 mod stray_vertices;
@@ -7,8 +8,9 @@ mod tables;
 mod validation;
 mod writer;
 
+pub use adjustments::{ADJUSTMENTS_FILE, ADJUSTMENTS_MAGIC, ADJUSTMENTS_VERSION, Adjustments};
 pub use boxes::MeshBoxes;
-pub use mapped::{AssetMesh, MESH_MAGIC, MESH_VERSION};
+pub use mapped::{AssetMesh, DRAPED_FILE, MESH_MAGIC, MESH_VERSION};
 pub use tables::{AssetReport, Finding, Instance, Material, Materials, Object, Rank, SurfaceClass, Wrap};
 pub use validation::{GeometryLimits, SkippedGeometry};
 pub use writer::AssetWriter;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use map3d_base::asset::{AssetMesh, Instance, Materials};
+use map3d_base::asset::{ADJUSTMENTS_FILE, AssetMesh, DRAPED_FILE, Instance, Materials};
 use map3d_base::{Box3, Error, Result, Vec3};
 use serde::{Deserialize, Serialize};
 use twox_hash::XxHash3_128;
@@ -43,22 +43,25 @@ pub fn read_or_measure(folder: &Path) -> Result<ContentCells> {
 pub fn measure_asset(folder: &Path) -> Result<ContentCells> {
     let mesh = AssetMesh::open(&folder.join("mesh.m3a"))?;
     let mut measure = Measure::default();
-    let (triangles, objects, prototypes, positions) = (mesh.triangles(), mesh.objects(), mesh.prototypes(), mesh.positions());
     let mut bounds: BTreeMap<u32, Box3> = BTreeMap::new();
-    for (t, corners) in triangles.iter().enumerate() {
-        let corners = corners.map(|v| positions[v as usize]);
-        match prototypes[t] {
-            0 => measure.add(objects[t], corners),
-            k => corners.iter().for_each(|p| bounds.entry(k).or_insert(Box3::EMPTY).add_point(*p)),
+    for mesh in mesh.drawn() {
+        let (objects, prototypes) = (mesh.objects(), mesh.prototypes());
+        for t in 0..mesh.triangles().len() {
+            if t % PIECE == PIECE - 1 {
+                mesh.release();
+            }
+            let Some(corners) = mesh.corners(t) else { continue };
+            match prototypes[t] {
+                0 => measure.add(objects[t], corners),
+                k => corners.iter().for_each(|p| bounds.entry(k).or_insert(Box3::EMPTY).add_point(*p)),
+            }
         }
-        if t % PIECE == PIECE - 1 {
-            mesh.release();
-        }
+        mesh.release();
     }
-    mesh.release();
     for instance in read_instances(folder)? {
+        let Some(transform) = mesh.placed(instance.object, &instance.transform) else { continue };
         if let Some(placed) = bounds.get(&instance.prototype) {
-            measure.add(instance.object, placed_diagonal(placed, &instance.transform));
+            measure.add(instance.object, placed_diagonal(placed, &transform));
         }
     }
     Ok(measure.finish())
@@ -103,7 +106,7 @@ fn read_instances(folder: &Path) -> Result<Vec<Instance>> {
     Ok(instances)
 }
 
-/// Hashes the header of the mesh, which has its checksum, and the materials, which have the instances.
+/// Hashes the headers of the mesh and of its adjustments, which have their checksums, and the materials, which have the instances.
 fn digest(folder: &Path) -> Result<String> {
     let mesh = folder.join("mesh.m3a");
     let mut head = [0; 64];
@@ -113,5 +116,21 @@ fn digest(folder: &Path) -> Result<String> {
     let mut hash = XxHash3_128::with_seed(u64::from(VERSION));
     hash.write(&head);
     hash.write(&std::fs::read(&materials).map_err(|e| Error::storage(&materials, e))?);
+    adjusted_heads(folder)?.iter().for_each(|head| hash.write(head));
     Ok(format!("{:032x}", hash.finish_128()))
+}
+
+/// Returns the headers of the files that adjust an asset, with their checksums; none for an asset that is drawn as imported.
+pub fn adjusted_heads(folder: &Path) -> Result<Vec<[u8; 64]>> {
+    let mut heads = Vec::new();
+    for path in [ADJUSTMENTS_FILE, DRAPED_FILE].map(|name| folder.join(name)) {
+        let mut head = [0; 64];
+        match std::fs::File::open(&path) {
+            Ok(mut file) => std::io::Read::read_exact(&mut file, &mut head).map_err(|_| Error::format(&path, "truncated"))?,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => continue,
+            Err(error) => return Err(Error::storage(&path, error)),
+        }
+        heads.push(head);
+    }
+    Ok(heads)
 }

@@ -7,4 +7,4 @@ mod measure;
 
 pub use cells::{ContentCell, ContentCells};
 pub use clusters::{Choice, Cluster, Content};
-pub use measure::{CELLS_FILE, measure_asset, read_or_measure};
+pub use measure::{CELLS_FILE, adjusted_heads, measure_asset, read_or_measure};

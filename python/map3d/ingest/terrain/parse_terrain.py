@@ -14,6 +14,7 @@ from map3d.errors import CrsError, ImportFailed
 from map3d.geometry.crs import is_local, parse_crs
 from map3d.ingest.exactness import stretch_findings
 from map3d.ingest.findings import finding
+from map3d.ingest.ground_grid import GroundGrid
 from map3d.ingest.scene_crs import LOCAL, choose_scene_crs, to_scene_crs
 from map3d.ingest.terrain.damaged_reads import READ_ERRORS
 from map3d.ingest.terrain.placed_rasters import PlacedRasters
@@ -47,7 +48,7 @@ def open_terrain_parser(_setup: Mapping[str, Any]) -> Handler:
 def _parse(request: Mapping[str, Any], report_progress: ReportProgress) -> dict[str, Any]:
     """`request`: {"paths", "folder", "name", "crs", "scene_crs", "scene_origin", "reader", "checkpoints": folder or None, "cores",
     "virtual": the virtual rasters that may be read, and the folders in which the rasters that they name must be,
-    "grids": the rasters that RasterReliefs name, and their grids}.
+    "grids": the rasters that RasterReliefs name, and their grids, "ground": the GroundGrid below a photo without elevation model, or None}.
 
     Returns what map3d.ingest.parse_document returns.
     """
@@ -78,7 +79,8 @@ def _parse_placed(request: Mapping[str, Any], placed: PlacedRasters, report_prog
         return True
 
     max_error_m = request["reader"].get("max_error_m", 0.0)
-    options = TerrainOptions(name=request["name"], max_error_m=max_error_m, crs=stated, ranks=choice.ranks, strict=strict)
+    grid = None if request["ground"] is None else GroundGrid.load(request["ground"])
+    options = TerrainOptions(name=request["name"], max_error_m=max_error_m, crs=stated, ranks=choice.ranks, strict=strict, ground_grid=grid)
     options = replace(options, workers=worker_count(request["cores"], _free_bytes(), options.texture_px, choice.orthos))
     checkpoints = request["checkpoints"] and Path(request["checkpoints"])
     terrain = _import(choice, Path(request["folder"]), target, options, on_tile, checkpoints)
@@ -99,7 +101,8 @@ def _parse_placed(request: Mapping[str, Any], placed: PlacedRasters, report_prog
             terrain["findings"].append(finding(code, len(reasons), reasons[0]))
     counts = {"elevation": len(choice.dems), "imagery": len(choice.orthos)}
     first = next(iter([*choice.dems, *choice.orthos])).name
-    return {"report": {**terrain, "rasters": counts, "first_raster": first, "placing": placing}, "crs": asdict(proposed)}
+    ground = {"ground": grid.digest} if grid is not None and not choice.dems else {}
+    return {"report": {**terrain, "rasters": counts, "first_raster": first, "placing": placing, **ground}, "crs": asdict(proposed)}
 
 
 def _placeable(rasters: Sequence[Path], request: Mapping[str, Any]) -> tuple[list[Path], list[str]]:

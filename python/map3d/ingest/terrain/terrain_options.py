@@ -8,23 +8,25 @@ from typing import Final
 import numpy as np
 
 from map3d.errors import BadRequest
+from map3d.ingest.ground_grid import GroundGrid
 
 MAX_WORKERS: Final = 256
 
 
 @dataclass(frozen=True)
 class TerrainOptions:
-    """`max_error_m`: greatest height error of the triangles, 0 keeps every height. `height_m`: height of flat terrain without an elevation model.
-    `height_unit_m`: metres per unit of the elevation model; None takes the unit from the file, else metres. `ground`: sRGB colour in gaps of the
-    photo. `crs`: overrides the CRS of both rasters, or supplies a missing one; "local" for plain metres. `workers`: threads; the asset does not
-    depend on their number. `ranks`: of kinds of rasters; of several at one place, one of the lowest is on top. `strict`: the first raster that
-    cannot be read as a whole raises ImportFailed."""
+    """`max_error_m`: greatest height error of the triangles, 0 keeps every height. `height_m`: height of flat terrain without an elevation model;
+    `ground_grid`: heights in place of that. `height_unit_m`: metres per unit of the elevation model; None takes the unit from the file, else metres.
+    `ground`: sRGB colour in gaps of the photo. `crs`: overrides the CRS of both rasters, or supplies a missing one; "local" for plain metres.
+    `workers`: threads; the asset does not depend on their number. `ranks`: of kinds of rasters; of several at one place, one of the lowest is on top.
+    `strict`: the first raster that cannot be read as a whole raises ImportFailed."""
 
     name: str = "terrain"
     max_error_m: float = 0.0
     tile_cells: int = 256
     texture_px: int = 2048
     height_m: float = 0.0
+    ground_grid: GroundGrid | None = None
     height_unit_m: float | None = None
     ground: tuple[int, int, int] = (146, 146, 136)
     crs: str | None = None

@@ -14,6 +14,7 @@ from map3d.geometry.crs import horizontal_crs, vertical_unit_m
 from map3d.ingest.exactness import transformation_findings
 from map3d.ingest.findings import finding
 from map3d.ingest.terrain.damaged_reads import Damage
+from map3d.ingest.terrain.ground_heights import GroundHeightField
 from map3d.ingest.terrain.orthophoto import ALIGN_PX, MARGIN_PX, Orthophoto
 from map3d.ingest.terrain.photo_margin import PhotoMargin, PhotoMargins
 from map3d.ingest.terrain.photo_values import ValueRange
@@ -35,6 +36,7 @@ MAX_TRIANGLES: Final = 200_000_000
 MAX_TILES: Final = 10_000_000
 REDUCE_RASTER: Final = "allow a height error, such as --max-error 0.1, or reduce the resolution with gdal_translate -tr"
 FLAT_TILE_CELLS: Final = 8
+MAX_DRAPED_TILE_CELLS: Final = 64
 UNITS_M: Final = {"m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048}
 US_FOOT_M: Final = 1200 / 3937
 US_UNITS_M: Final = {"us-ft": US_FOOT_M, "ftus": US_FOOT_M, "us survey foot": US_FOOT_M, "us survey feet": US_FOOT_M}
@@ -117,8 +119,11 @@ class TerrainRasters:
         free_px = self._options.texture_px - 2 * (MARGIN_PX + ALIGN_PX)
         height, width = self.base.height, self.base.width
         if self.flat:
-            step = free_px / FLAT_TILE_CELLS
-            return self._checked(VertexGrid(regular_positions(height, step), regular_positions(width, step), FLAT_TILE_CELLS), 1)
+            cells = FLAT_TILE_CELLS
+            if isinstance(self.height_field, GroundHeightField):
+                cells = max(cells, min(MAX_DRAPED_TILE_CELLS, int(np.ceil(self.height_field.cells_of(free_px)))))
+            step = free_px / cells
+            return self._checked(VertexGrid(regular_positions(height, step), regular_positions(width, step), cells), 1)
         cell_px = self._photo_px_per_cell()
         parts = max(1, -(-int(np.ceil(cell_px)) // free_px))
         side = self._options.tile_cells
@@ -133,6 +138,8 @@ class TerrainRasters:
         unknown = [unit for unit in map(self._unknown_unit, _datasets(self.dem)) if unit]
         if unknown:
             found.append(finding("height-unit-unknown", len(unknown), unknown[0]))
+        if isinstance(self.height_field, GroundHeightField):
+            found.append(finding("photo-draped-on-bases", len(list(_datasets(self.ortho))), Path(self.base.name).name))
         if self._scene_crs is not None and self._options.crs is None:
             missing = [raster for raster in (self.dem, self.ortho) if raster is not None and raster.crs is None]
             found += [finding("raster-crs-assumed", 1, Path(raster.name).name) for raster in missing]
@@ -198,6 +205,8 @@ class TerrainRasters:
         return self.photo_georeference.pixels_from_plane(*self.photo_from_base(*self.georeference.plane_from_pixels(rows, columns)))
 
     def _open_heights(self, dem: Any) -> HeightField:
+        if dem is None and self._options.ground_grid is not None:
+            return GroundHeightField(self, self._options.ground_grid)
         if dem is None:
             return ConstantHeightField(self._options.height_m)
         if isinstance(dem, RasterMosaic):

@@ -12,8 +12,9 @@ from map3d.web.http.host_folders import values_without_host_folders, without_hos
 
 def scene_value(scene: SceneRecord) -> dict[str, Any]:
     value: dict[str, Any] = {"name": scene.name, "title": scene.title, "attribution": scene.attribution, "built": scene.built is not None}
-    if scene.crs is not None:
-        parts = {"name": scene.crs.name, "epsg": scene.crs.epsg, "vertical": scene.crs.vertical}
+    crs = scene.stated_crs
+    if crs is not None:
+        parts = {"name": crs.name, "epsg": crs.epsg, "vertical": crs.vertical}
         value["crs"] = {name: part for name, part in parts.items() if part is not None}
     if scene.origin is not None:
         value["origin"] = list(scene.origin)

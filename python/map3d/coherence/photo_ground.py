@@ -1,0 +1,34 @@
+"""The ground of a photo without elevation model: relief in the documents of the scene, else interpolated between the bases of their objects."""
+
+import numpy as np
+
+from map3d import _core
+from map3d.catalogue import AssetRecord, Catalogue, Workspace
+from map3d.coherence.ground import bases_grid, bases_of, terrain_surfaces
+from map3d.coherence.same_objects import find_same_objects
+from map3d.coherence.surveyed_assets import SurveyedAsset
+from map3d.ingest.ground_grid import MAX_CELLS, GroundGrid
+
+
+def photo_ground(workspace: Workspace, catalogue: Catalogue, scene: str) -> GroundGrid | None:
+    """Returns the ground between the objects of the documents of a scene; None if nothing stands on it."""
+    assets = [SurveyedAsset(asset, workspace.asset_folder(scene, asset.name)) for asset in catalogue.assets(scene) if "rasters" not in asset.report]
+    kept = find_same_objects(assets).kept
+    surfaces = terrain_surfaces(assets, kept, is_adjusted=False)
+    if not surfaces:
+        return bases_grid(assets, kept)
+    boxes = np.concatenate([asset.boxes[asset.drawn & asset.is_terrain] for asset in assets])
+    low, high = boxes[:, 0, :2].min(axis=0), boxes[:, 1, :2].max(axis=0)
+    x, y = np.meshgrid(*(np.linspace(start, end, MAX_CELLS) for start, end in zip(low, high, strict=True)))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    relief = np.column_stack([points, _core.surface_heights(surfaces, points)])
+    return GroundGrid.of_bases(np.concatenate([relief, *(bases_of(asset, kept[asset.name]) for asset in assets)]))
+
+
+def ground_change(asset: AssetRecord, ground: GroundGrid | None) -> str | None:
+    """Returns why a photo without elevation model has to be imported again, as the end of the sentence "imported again because …"; None for any other
+    asset and while its ground is the same."""
+    rasters = asset.report.get("rasters")
+    if rasters is None or rasters["elevation"] or asset.report.get("ground") == (None if ground is None else ground.digest):
+        return None
+    return "the ground of its photos changed"

@@ -1,0 +1,73 @@
+"""Rows of the table of contradictions about heights, and about objects that several files have."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from pyproj import Transformer
+
+from tests.coherence.documents import EAST, NORTH, UTM, town, write_dem, write_flat, write_houses, write_photo
+from tests.odd_cities.contradictions import Row
+
+_TO_DEGREES = Transformer.from_crs(UTM, "EPSG:4326", always_xy=True)
+TOWN = _TO_DEGREES.transform(EAST + 65.0, NORTH + 64.0)
+"""Longitude and latitude of the middle of the town, and of that of the terrain below it."""
+TERRAIN = _TO_DEGREES.transform(EAST + 100.0, NORTH + 100.0)
+
+
+def _on_terrain(folder: Path, *, factor: float = 1.0, base: float | None = None, above: float = 0.0) -> None:
+    write_houses(folder / "town.gml", town(base=base, above=above, factor=factor))
+    write_dem(folder / "dem.tif")
+
+
+def _with(write: Callable[[Path], object], folder: Path) -> None:
+    write_houses(folder / "town.gml", town(base=510.0))
+    write(folder)
+
+
+def _roads(folder: Path) -> None:
+    write_flat(folder / "roads.gml", "tran:Road", {"r": [(0.0, 20.0, 0.0), (130.0, 20.0, 0.0), (130.0, 30.0, 0.0), (0.0, 30.0, 0.0)]}, dimension=2)
+
+
+def _lods(folder: Path) -> None:
+    write_houses(folder / "LoD1" / "690_5336.gml", town(base=510.0), lod=1)
+    write_houses(folder / "LoD2" / "690_5336.gml", town(base=510.0), lod=2)
+
+
+def _copy(folder: Path) -> None:
+    write_houses(folder / "a.gml", town(base=510.0))
+    write_houses(folder / "b.gml", town("other", base=510.0))
+
+
+def _stray(folder: Path) -> None:
+    houses = town(base=510.0)
+    write_houses(folder / "a.gml", [*houses[:5], type(houses[5])("b5", houses[5].x, houses[5].y, -10.0), *houses[6:]])
+
+
+TOWN_M = (130.0, 128.0, 9.0)
+TERRAIN_M = (400.0, 400.0)
+
+HEIGHT: list[Row] = [
+    Row("a town 505 m below its terrain", partial(_on_terrain, above=-505.0), TERRAIN, (*TERRAIN_M, 520.0), 17, ("heights-below-terrain",)),
+    Row("the same, moved", partial(_on_terrain, above=-505.0), TERRAIN, (*TERRAIN_M, 20.0), 17, ("heights-moved",), {"heights": "505"}),
+    Row("a town at 0 on a hill", partial(_on_terrain, base=0.0), TERRAIN, (*TERRAIN_M, 520.0), 17, ("heights-at-zero",)),
+    Row("the same, set on it", partial(_on_terrain, base=0.0), TERRAIN, (*TERRAIN_M, 20.0), 17, ("objects-clamped",), {"heights": "clamp"}),
+    Row("a town on the ellipsoid", partial(_on_terrain, above=46.5), TERRAIN, (*TERRAIN_M, 66.4), 17, ("heights-ellipsoidal",)),
+    Row("heights in feet", partial(_on_terrain, factor=1 / 0.3048), TERRAIN, (*TERRAIN_M, 1205.9), 17, ("heights-in-feet",)),
+    Row("the same, read so", partial(_on_terrain, factor=1 / 0.3048), TERRAIN, (*TERRAIN_M, 19.9), 17, (), {"height_unit": "ft"}),
+    Row("one house 520 m below the others", _stray, TOWN, (130.0, 128.0, 529.0), 16, ("objects-off-ground",)),
+    Row("roads without heights", partial(_with, _roads), TOWN, TOWN_M, 17, ("flat-objects-draped",)),
+    Row(
+        "a photo without elevation model",
+        partial(_with, lambda folder: write_photo(folder / "ortho.tif")),
+        TERRAIN,
+        (*TERRAIN_M, 9.0),
+        17,
+        ("photo-draped-on-bases",),
+    ),
+]
+
+SAME_OBJECTS: list[Row] = [
+    Row("two levels of detail of one town", _lods, TOWN, TOWN_M, 16, ("objects-finer-elsewhere",)),
+    Row("the same houses under other names", _copy, TOWN, TOWN_M, 16, ("file-is-copy",)),
+]
