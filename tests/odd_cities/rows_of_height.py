@@ -48,15 +48,19 @@ TOWN_M = (130.0, 128.0, 9.0)
 TERRAIN_M = (400.0, 400.0)
 
 HEIGHT: list[Row] = [
-    Row("a town 505 m below its terrain", partial(_on_terrain, above=-505.0), TERRAIN, (*TERRAIN_M, 520.0), 17, ("heights-below-terrain",)),
-    Row("the same, moved", partial(_on_terrain, above=-505.0), TERRAIN, (*TERRAIN_M, 20.0), 17, ("heights-moved",), {"heights": "505"}),
-    Row("a town at 0 on a hill", partial(_on_terrain, base=0.0), TERRAIN, (*TERRAIN_M, 520.0), 17, ("heights-at-zero",)),
-    Row("the same, set on it", partial(_on_terrain, base=0.0), TERRAIN, (*TERRAIN_M, 20.0), 17, ("objects-clamped",), {"heights": "clamp"}),
-    Row("a town on the ellipsoid", partial(_on_terrain, above=46.5), TERRAIN, (*TERRAIN_M, 66.4), 17, ("heights-ellipsoidal",)),
-    Row("heights in feet", partial(_on_terrain, factor=1 / 0.3048), TERRAIN, (*TERRAIN_M, 1205.9), 17, ("heights-in-feet",)),
-    Row("the same, read so", partial(_on_terrain, factor=1 / 0.3048), TERRAIN, (*TERRAIN_M, 19.9), 17, (), {"height_unit": "ft"}),
+    Row(
+        "a town 505 m below its terrain", partial(_on_terrain, above=-505.0), TERRAIN, (*TERRAIN_M, 520.0), 17, ("heights-below-terrain",), textures=1
+    ),
+    Row("the same, moved", partial(_on_terrain, above=-505.0), TERRAIN, (*TERRAIN_M, 20.0), 17, ("heights-moved",), {"heights": "505"}, textures=1),
+    Row("a town at 0 on a hill", partial(_on_terrain, base=0.0), TERRAIN, (*TERRAIN_M, 520.0), 17, ("heights-at-zero",), textures=1),
+    Row(
+        "the same, set on it", partial(_on_terrain, base=0.0), TERRAIN, (*TERRAIN_M, 20.0), 17, ("objects-clamped",), {"heights": "clamp"}, textures=1
+    ),
+    Row("a town on the ellipsoid", partial(_on_terrain, above=46.5), TERRAIN, (*TERRAIN_M, 66.4), 17, ("heights-ellipsoidal",), textures=1),
+    Row("heights in feet", partial(_on_terrain, factor=1 / 0.3048), TERRAIN, (*TERRAIN_M, 1205.9), 17, ("heights-in-feet",), textures=1),
+    Row("the same, read so", partial(_on_terrain, factor=1 / 0.3048), TERRAIN, (*TERRAIN_M, 19.9), 17, (), {"height_unit": "ft"}, textures=1),
     Row("one house 520 m below the others", _stray, TOWN, (130.0, 128.0, 529.0), 16, ("objects-off-ground",)),
-    Row("roads without heights", partial(_with, _roads), TOWN, TOWN_M, 17, ("flat-objects-draped",)),
+    Row("roads without heights", partial(_with, _roads), TOWN, TOWN_M, 17, ("flat-objects-draped", "polygon-without-height")),
     Row(
         "a photo without elevation model",
         partial(_with, lambda folder: write_photo(folder / "ortho.tif")),
@@ -64,6 +68,7 @@ HEIGHT: list[Row] = [
         (*TERRAIN_M, 9.0),
         17,
         ("photo-draped-on-bases",),
+        textures=1,
     ),
 ]
 
