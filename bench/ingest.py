@@ -90,7 +90,7 @@ def _parser_request(source: SourceDocument, folder: Path) -> dict[str, Any]:
     options = ImportOptions(crs="local")
     limits = options.limits(source.paths, source.format)
     place = {"path": str(source.paths[0].absolute()), "format": source.format, "folder": str(folder.absolute()), "name": source.name}
-    return {**place, "reader": options.reader_options(source.format, limits), "crs": "local", "scene_crs": "local"}
+    return {**place, "reader": options.reader_options(source.format, limits), "crs": "local", "scene_crs": "local", "placing": {}, "place": None}
 
 
 def _scene_origin(asset: Path) -> list[float]:

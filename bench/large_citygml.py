@@ -56,7 +56,16 @@ def read_in_process(path: Path) -> Reading:
     """Imports a file and returns what that took."""
     with tempfile.TemporaryDirectory(prefix="map3d-large-") as folder:
         reader = {"strict": False, "folder": str(path.parent)}
-        request = {"path": str(path), "format": "citygml", "folder": folder, "reader": reader, "crs": "local", "scene_crs": "local"}
+        request = {
+            "path": str(path),
+            "format": "citygml",
+            "folder": folder,
+            "reader": reader,
+            "crs": "local",
+            "scene_crs": "local",
+            "placing": {},
+            "place": None,
+        }
         done = subprocess.run([sys.executable, "-c", _PROGRAM, json.dumps(request)], check=True, capture_output=True, text=True)
     return Reading(path.stat().st_size, **json.loads(done.stdout))
 
