@@ -86,9 +86,9 @@ FLAT = (place(WEST + 20, NORTH - 20), (40.0, 40.0, 0.0), 1)
 FILES: list[Row] = [
     Row("backups and copies", with_copies("town.gml~", "town.gml.bak", "town (1).gml"), *TOWN, 16, ("left-backup", "left-same-content")),
     Row("an archive in the folder", packed, *TOWN, 16),
-    Row("a photo that is a texture", ortho_of_a_model, place(WEST + 5, NORTH + 5), (10.0, 10.0, 0.0), 1, ("used-as-texture",)),
-    Row("aspect and surface beside terrain", terrain("aspect.tif", "DSM.tif"), *FLAT, ("raster-not-used",)),
-    Row("a photo that is cut", one_cut_photo, *FLAT, ("raster-damaged",)),
-    Row("a photo of 16 bits", wide_photo, *FLAT, ("photo-values-scaled",)),
+    Row("a photo that is a texture", ortho_of_a_model, place(WEST + 5, NORTH + 5), (10.0, 10.0, 0.0), 1, ("used-as-texture",), textures=1),
+    Row("aspect and surface beside terrain", terrain("aspect.tif", "DSM.tif"), *FLAT, ("raster-not-used",), textures=1),
+    Row("a photo that is cut", one_cut_photo, *FLAT, ("raster-damaged",), textures=1),
+    Row("a photo of 16 bits", wide_photo, *FLAT, ("photo-values-scaled",), textures=1),
     Row("a model with an offset", model_with_offset, place(WEST + 4, NORTH + 5), (8.0, 10.0, 6.0), 1, ("model-placed", "used-as-place")),
 ]
