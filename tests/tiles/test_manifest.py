@@ -154,9 +154,9 @@ def test_data_tiles_are_the_format_of_the_data_layer_alone(manifest, kind, forma
 def test_the_schema_lists_every_member(manifest, added):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
     shown = tuple(replace(view, thumbnail=THUMBNAIL) for view in added.views)
-    value = replace(added, geographic=GEOGRAPHIC, views=shown).with_archives(archives, 7).to_json()
+    value = replace(added, geographic=GEOGRAPHIC, views=shown).with_archives(archives, 7, 1 << 20).to_json()
     schema = SCHEMA["properties"]
-    assert set(schema) == set(value) == {*SCHEMA["required"], "geographic"}
+    assert set(schema) == set(value) == {*SCHEMA["required"], "geographic", "archive_part_bytes"}
     assert set(schema["views"]["items"]["properties"]) == set(value["views"][0])
     assert set(schema["layers"]["items"]["properties"]) == set().union(*value["layers"])
     assert set(schema["crs"]["properties"]) == set(value["crs"])
