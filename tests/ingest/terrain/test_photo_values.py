@@ -152,7 +152,7 @@ def parse(folder: Path, *paths: Path, strict: bool = False, **more: Any) -> dict
     folder.mkdir()
     request = {
         "paths": [str(path) for path in paths], "folder": str(folder), "name": "t", "crs": None, "scene_crs": None, "scene_origin": None,
-        "reader": {"strict": strict}, "checkpoints": None, "cores": 2, "grids": {}, "virtual": {}, **more,
+        "reader": {"strict": strict}, "checkpoints": None, "cores": 2, "grids": {}, "virtual": {}, "ground": None, **more,
     }  # fmt: skip
     answer, _ = open_terrain_parser({})(request, [], lambda _: None)
     report: dict[str, Any] = answer["report"]
