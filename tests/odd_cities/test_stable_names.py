@@ -2,6 +2,7 @@
 
 import shutil
 from pathlib import Path
+from zlib import crc32
 
 import pytest
 
@@ -20,8 +21,9 @@ OPTIONS = ImportOptions(crs="local")
 
 
 def write(city: Path, name: str) -> None:
-    """Writes a file whose gml:ids begin with its path."""
-    write_citygml(city / name, None, lambda corners: corners, side=1, prefix=name.replace("/", "-").replace(".", "-") + "-")
+    """Writes a file whose gml:ids begin with its path, which also determines its place."""
+    place = (100.0 * (crc32(name.encode()) % 97), 0.0, 0.0)
+    write_citygml(city / name, None, lambda corners: corners + place, side=1, prefix=name.replace("/", "-").replace(".", "-") + "-")
 
 
 def ids(workspace: Workspace) -> dict[str, tuple[str, int]]:
