@@ -15,9 +15,9 @@ def photo_ground(workspace: Workspace, catalogue: Catalogue, scene: str) -> Grou
     assets = [SurveyedAsset(asset, workspace.asset_folder(scene, asset.name)) for asset in catalogue.assets(scene) if "rasters" not in asset.report]
     kept = find_same_objects(assets).kept
     surfaces = terrain_surfaces(assets, kept, is_adjusted=False)
-    if not surfaces:
+    boxes = np.concatenate([asset.boxes[asset.drawn & asset.is_terrain] for asset in assets]) if surfaces else np.empty((0, 2, 3))
+    if not len(boxes):
         return bases_grid(assets, kept)
-    boxes = np.concatenate([asset.boxes[asset.drawn & asset.is_terrain] for asset in assets])
     low, high = boxes[:, 0, :2].min(axis=0), boxes[:, 1, :2].max(axis=0)
     x, y = np.meshgrid(*(np.linspace(start, end, MAX_CELLS) for start, end in zip(low, high, strict=True)))
     points = np.column_stack([x.ravel(), y.ravel()])
