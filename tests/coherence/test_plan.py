@@ -54,9 +54,9 @@ def test_a_house_follows_the_content_of_the_scene(tmp_path: Path) -> None:
 def test_files_of_the_largest_place_come_first(tmp_path: Path) -> None:
     write(tmp_path, "a", (15.5, 51.3), NORTH_FIRST, side=3)
     write(tmp_path, "b", FIELDS, NORTH_FIRST)
-    write(tmp_path, "c", FIELDS, NORTH_FIRST)
+    write(tmp_path, "c", FIELDS, NORTH_FIRST, side=5)
     (tmp_path / "d.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert [source.name for source in plan(tmp_path).sources] == ["b", "c", "a", "d"]
     (tmp_path / "a.gml").unlink()
-    write(tmp_path, "e", FIELDS, NORTH_FIRST)
+    write(tmp_path, "e", FIELDS, NORTH_FIRST, side=6)
     assert [source.name for source in plan(tmp_path).sources] == ["b", "c", "e", "d"], "in one place, the given order"
