@@ -131,7 +131,7 @@ def test_all_usable_parts_of_a_messy_folder_are_rendered(run: Run, tmp_path: Pat
     status, out, err = run("create-rendering", "town", "view", "--res", "0.2", "--view", "0/45", "--json")
     assert status == 0, err
     built = json.loads(out)["build"]
-    assert built["materials_without_their_texture"] == 0, "the damaged image is none of the model"
+    assert built["materials_without_their_texture"] == 0, "the model does without the damaged image"
     status, out, err = run("render", "view", "--json")
     assert (status, json.loads(out)["complete"]) == (0, True), err
     workspace = Workspace(tmp_path / "workspace")
