@@ -320,7 +320,7 @@ export class WebGLDrawer implements Drawer {
 }
 
 /** What restores the contexts that maps have given back; a lost context no longer has it. */
-const lost = new WeakMap<HTMLCanvasElement, WEBGL_lose_context>();
+const restorers = new WeakMap<HTMLCanvasElement, WEBGL_lose_context>();
 
 /** Gives a context back at once: browsers have few, and take them from others on the page. */
 function loseContext(canvas: HTMLCanvasElement, gl: WebGL2RenderingContext): void {
@@ -328,13 +328,13 @@ function loseContext(canvas: HTMLCanvasElement, gl: WebGL2RenderingContext): voi
   if (!context) return;
   // Without this, the next map on the canvas could not restore it.
   canvas.addEventListener("webglcontextlost", (event) => event.preventDefault(), { once: true });
-  lost.set(canvas, context);
+  restorers.set(canvas, context);
   context.loseContext();
 }
 
 /** Restores the context of a canvas that had a map before, once the browser has told its loss. */
 function restoreContext(canvas: HTMLCanvasElement): void {
-  const context = lost.get(canvas);
+  const context = restorers.get(canvas);
   setTimeout(() => context?.restoreContext());
 }
 
