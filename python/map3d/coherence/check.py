@@ -25,12 +25,12 @@ from map3d.coherence.same_objects import find_same_objects
 from map3d.coherence.surveyed_assets import Flags, SurveyedAsset
 from map3d.geometry.crs import horizontal_crs, parse_crs
 from map3d.geometry.geoid import geoid_above_ellipsoid_m
-from map3d.ingest.asset import left_out, world_boxes
+from map3d.ingest.asset import left_out, local_box, world_boxes
 from map3d.ingest.findings import CONTRADICTIONS, finding
 from map3d.ingest.unfinished_imports import finish_imports
 from map3d.registry import Registry
 from map3d.requests.heights import BY_EVIDENCE, HeightRule, parse_heights
-from map3d.types import Box, Vec3
+from map3d.types import Vec3
 
 FILE: Final = "coherence.json"
 VERSION: Final = 1
@@ -188,15 +188,8 @@ def _register(registry: Registry, asset: SurveyedAsset, origin: Vec3) -> None:
     """Registers the boxes of objects as they are drawn; those that are left out are not present."""
     ids = np.fromfile(asset.folder / "ids.u32", "<u4").tolist()
     boxes = world_boxes(asset.folder, len(ids))
-    local = dict(zip(ids, (_local(box, origin) for box in boxes), strict=True))
+    local = dict(zip(ids, (local_box(box, origin) for box in boxes), strict=True))
     registry.set_boxes(asset.name, local, {ids[number] for number in left_out(asset.folder, len(ids)).tolist()})
-
-
-def _local(box: Box | None, origin: Vec3) -> Box | None:
-    if box is None:
-        return None
-    low, high = ((corner[0] - origin[0], corner[1] - origin[1], corner[2] - origin[2]) for corner in box)
-    return (low, high)
 
 
 def _report(catalogue: Catalogue, record: AssetRecord, said: Sequence[Mapping[str, Any]]) -> None:

@@ -120,8 +120,8 @@ def _import_files(
                     done = import_file(workspace, catalogue, scene, source, chosen, show, parser=parser, ground=ground)
                     result.imported.append(done)
                     grids.collect(done.report.get("grids", ()))
-            except OnlyGrids as found:
-                grids.collect(found.grids)
+            except OnlyGrids as empty:
+                grids.collect(empty.grids)
                 result.ignored.append((str(source.paths[0]), message(HEIGHTS_ALONE)))
             except Map3dError as error:
                 if options.strict or (is_single and not result.imported and not result.unchanged):

@@ -67,7 +67,7 @@ def left_out(folder: Path, count: int) -> NDArray[np.int64]:
 def new_objects(lines: list[dict[str, Any]], boxes: list[Box | None], origin: Vec3) -> list[NewObject]:
     """Returns the objects as the registry takes them, with local boxes."""
     return [
-        NewObject(line["name"], line["class"], line["parent"], line["lod"], line["attributes"], _local(box, origin))
+        NewObject(line["name"], line["class"], line["parent"], line["lod"], line["attributes"], local_box(box, origin))
         for line, box in zip(lines, boxes, strict=True)
     ]
 
@@ -135,7 +135,8 @@ def _moved(box: Box | None, transform: list[float]) -> Box | None:
     return _box(np.stack([moved.min(axis=0), moved.max(axis=0)]))
 
 
-def _local(box: Box | None, origin: Vec3) -> Box | None:
+def local_box(box: Box | None, origin: Vec3) -> Box | None:
+    """Converts a box from world to local coordinates of a scene, metres."""
     if box is None:
         return None
     low, high = ((corner[0] - origin[0], corner[1] - origin[1], corner[2] - origin[2]) for corner in box)

@@ -13,7 +13,7 @@ _PROBE: Final = "probe-"
 
 
 def check_conditional_writes(objects: ObjectStore) -> None:
-    """Raises StoreError for a store that accepts a write whose condition (If-None-Match, If-Match) does not hold. Folders are ours, and are not probed."""
+    """Raises StoreError for a store that accepts a write whose condition (If-None-Match, If-Match) does not hold. Folders are not probed."""
     if isinstance(objects, FolderStore):
         return
     name = f"{_PROBE}{uuid4().hex}"

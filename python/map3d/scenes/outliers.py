@@ -11,10 +11,10 @@ import numpy as np
 from map3d import _core
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
 from map3d.errors import BadRequest
-from map3d.ingest.asset import boxes_within, left_out, read_objects
+from map3d.ingest.asset import boxes_within, left_out, local_box, read_objects
 from map3d.ingest.content import CLUSTER, KEEP_OUTLIERS, Cluster, Content, ContentExtent, find_content
 from map3d.registry import Registry
-from map3d.types import Box, Vec3
+from map3d.types import Box
 
 FILE: Final = "outliers.json"
 EXAMPLES: Final = 5
@@ -108,7 +108,8 @@ class OutlierCheck:
         boxes, outside = boxes_within(folder, len(ids), extent)
         absent = {number for number, whole, kept in zip(ids, all_boxes, boxes, strict=True) if whole is not None and kept is None}
         absent |= {ids[number] for number in left_out(folder, len(ids)).tolist()}
-        local = {number: _local(box, self.scene.origin) for number, box in zip(ids, boxes, strict=True)}
+        assert self.scene.origin is not None, "a scene with files has an origin"
+        local = {number: local_box(box, self.scene.origin) for number, box in zip(ids, boxes, strict=True)}
         registry.set_boxes(asset.name, local, absent)
         left = [k for k, count in enumerate(outside) if count]
         if not left or extent is None:
@@ -154,13 +155,6 @@ def _distance_m(box: Box | None, kept: Sequence[Box]) -> float:
     if box is None:
         return 0.0
     return round(min(max(max(other[0][k] - box[0][k], box[1][k] - other[1][k], 0.0) for k in range(3)) for other in kept), 1)
-
-
-def _local(box: Box | None, origin: Vec3 | None) -> Box | None:
-    if box is None or origin is None:
-        return None
-    low, high = ((corner[0] - origin[0], corner[1] - origin[1], corner[2] - origin[2]) for corner in box)
-    return (low, high)
 
 
 def _as_box(value: Any) -> Box:
