@@ -98,7 +98,7 @@ def city(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_site_ends_with_a_map_and_a_report(tmp_path: Path, run: Run, city: Path) -> None:
     site = measured(tmp_path, "site", str(city), "-o", "map", "--view", "45-45", "--res", "0.5", "--workers", "1", "--max-memory", f"{LIMIT_MIB}M")
     out, err = site.out, site.err
-    assert site.status == 0, err
+    assert site.status == 3, err  # a map, and files that could not be read
     assert "near Munich, Germany" in out
     for pattern in SAID:
         assert re.search(pattern, out + err), pattern
@@ -135,7 +135,7 @@ def test_what_is_kept_is_whole(tmp_path: Path, run: Run, city: Path) -> None:
 
 def test_every_object_is_seen_in_its_colour(tmp_path: Path, run: Run, city: Path) -> None:
     status, _, err = run("site", str(city), "-o", "map", "--view", "0-90", "--res", "1", "--color", "png", "--workers", "1")
-    assert status == 0, err
+    assert status == 3, err
     workspace = Workspace(tmp_path / "workspace")
     boxes = world_boxes(workspace, "city")
     low, high = zip(*boxes.values(), strict=True)
