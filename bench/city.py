@@ -120,7 +120,7 @@ def _publish(city: City) -> None:
         run_verb(["create-rendering", scene, rendering, *views, *window, "--title", f"City of {triangles:,} triangles", *where])
     _log(f"{scene}: render")
     run_verb(["render", rendering, *where])
-    run_verb(["publish", rendering, "-o", str(city.published), "--replace", *where])
+    run_verb(["publish", rendering, "-o", str(city.published), *where])
     (city.published / "bench.json").write_text(json.dumps({"triangles": triangles, "places": len(city.cells)}))
 
 

@@ -6,19 +6,26 @@ from typing import Final
 import click
 
 from map3d.cli.app import COMMANDS, cli
+from map3d.errors import EXIT_CODES
 
 TARGET: Final = Path(__file__).with_name("cli.md")
 HEAD: Final = "# Command line\n\nWritten by `make docs` from the commands' own help. All commands accept `-h`, `--help`.\n"
 
 
 def reference() -> str:
-    parts = [HEAD, section("map3d", cli)]
+    parts = [HEAD, exit_codes(), section("map3d", cli)]
     with click.Context(cli, info_name="map3d") as context:
         for name in COMMANDS:
             command = cli.get_command(context, name)
             assert command is not None
             parts += sections(f"map3d {name}", command)
     return "\n".join(parts)
+
+
+def exit_codes() -> str:
+    """Returns the table of the exit codes."""
+    rows = "\n".join(f"| {code} | {meaning} |" for code, meaning in EXIT_CODES.items())
+    return f"## Exit codes\n\n| code | meaning |\n|--:|---|\n{rows}\n"
 
 
 def sections(name: str, command: click.Command) -> list[str]:

@@ -1,16 +1,33 @@
 """The errors of map3d: one base class with small subclasses. Every message says what failed, where, what was found and expected, and what to do.
 
-The command line exits with `exit_code`: 2 for an invalid request, 1 for a task that failed; `map3d site` with 3 when it published although files
-could not be read.
+The command line exits with `exit_code`, a key of EXIT_CODES.
 """
 
+from collections.abc import Mapping
+from typing import Final
+
 from map3d.messages import Message
+
+FAILED: Final = 1
+INVALID: Final = 2
+IN_PART: Final = 3
+INTERRUPTED: Final = 130
+EXIT_CODES: Final[Mapping[int, str]] = {
+    0: "done",
+    FAILED: "failed, in whole or in part: files that could not be read (`inspect`, `add-files`), blocks in quarantine (`render`, `work`), problems "
+    "found (`verify`), a removal that was declined, or any other error; the last line says which",
+    INVALID: "invalid request: an unknown option or name, a missing file, a folder that holds something else; nothing was changed",
+    IN_PART: "done, although files could not be read, or not as a whole: the site is published (`site`), the files are imported as far as they are "
+    "intact (`add-files`, `inspect`)",
+    INTERRUPTED: "interrupted with Ctrl-C; the same command resumes",
+}
+"""Exit code of the command line → what it means. docs/cli.md has this table."""
 
 
 class Map3dError(Exception):
     """The base class of all errors that map3d raises deliberately. It is made of a message, or of one line of text for the user."""
 
-    exit_code = 1
+    exit_code = FAILED
     code = "verbatim"
     """The code of a text."""
 
@@ -23,7 +40,7 @@ class Map3dError(Exception):
 class BadRequest(Map3dError):
     """The request is invalid."""
 
-    exit_code = 2
+    exit_code = INVALID
 
 
 class NotFound(BadRequest):

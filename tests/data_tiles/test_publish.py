@@ -73,7 +73,7 @@ def test_publishing_again_writes_the_same_bytes(published: Path, workspace: Work
     publish(workspace, "tile", tmp_path / "out")
     first = contents(published / "tile")
     assert contents(tmp_path / "out") == first
-    done = publish(workspace, "tile", tmp_path / "out", replace=True)
+    done = publish(workspace, "tile", tmp_path / "out")
     assert (done.kept, done.archives) == (3, 3)
     assert contents(tmp_path / "out") == first
 

@@ -45,7 +45,7 @@ def test_an_address_is_named_instead_of_the_folder(workspace, out):
 
 def test_publishing_again_without_the_option_removes_them(workspace, out):
     publish(workspace, "tea", out, gis=True)
-    publish(workspace, "tea", out, replace=True)
+    publish(workspace, "tea", out)
     assert not (out / "gis").exists()
 
 

@@ -117,9 +117,7 @@ def test_a_store_receives_the_files_of_a_folder(workspace, out, store_url, tmp_p
 
 def test_publishing_again_sends_nothing(workspace, store_url, opened):
     publish(workspace, "tea", store_url)
-    with pytest.raises(AlreadyExists, match="--replace"):
-        publish(workspace, "tea", store_url)
-    done = publish(workspace, "tea", store_url, replace=True)
+    done = publish(workspace, "tea", store_url)
     assert (opened[0][-1].puts, opened[0][-1].deletes) == ([], [])
     assert (done.written, done.kept, done.removed) == (0, 8, 0)
 
@@ -128,7 +126,7 @@ def test_a_change_sends_the_changed_files_and_the_manifest_last(workspace, out, 
     publish(workspace, "tea", store_url)
     before = stored(store_url)
     change_a_view(workspace)
-    done = publish(workspace, "tea", store_url, replace=True)
+    done = publish(workspace, "tea", store_url)
     publish(workspace, "tea", out)
     assert current(stored(store_url)) == contents(out)
     recorder = opened[0][-1]
@@ -142,7 +140,7 @@ def test_a_change_sends_the_changed_files_and_the_manifest_last(workspace, out, 
     assert recorder.broken == []
     assert stored(store_url).keys() > before.keys(), "a map opened before the change still finds its archives"
     assert (recorder.deletes, done.kept, done.removed) == ([], 4, 0)
-    done = publish(workspace, "tea", store_url, replace=True)
+    done = publish(workspace, "tea", store_url)
     assert stored(store_url) == contents(out)
     assert sorted(opened[0][-1].deletes) == sorted(before.keys() - contents(out).keys())
     assert (done.kept, done.removed) == (8, 4)
@@ -166,12 +164,12 @@ def test_a_publication_stopped_at_any_request_is_completed_by_the_next(workspace
                 registry.put_asset("more", [NewObject("Tower", "building", box=((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), attributes={"new": 1})])
         fail["at"] = number
         try:
-            publish(copy, "tea", url, replace=not first)
+            publish(copy, "tea", url)
             break
         except StoreError:
             assert stores[-1].broken == []
         fail["at"] = None
-        publish(copy, "tea", url, replace=True)
+        publish(copy, "tea", url)
         assert stores[-1].broken == []
         publish(copy, "tea", tmp_path / f"folder{number}")
         assert current(stored(url)) == contents(tmp_path / f"folder{number}")
@@ -190,13 +188,13 @@ def test_a_change_that_is_undone_after_a_stop_is_sent(workspace, tmp_path, opene
         registry.put_asset("more", [NewObject("Tower", "building", box=((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)))])
     fail["at"] = 4
     with pytest.raises(StoreError):
-        publish(workspace, "tea", url, replace=True)
+        publish(workspace, "tea", url)
     assert stored(url) != before
     workspace.registry_path("town").write_bytes(saved)
     for log in workspace.registry_path("town").parent.glob("registry.sqlite-*"):
         log.unlink()
     fail["at"] = None
-    publish(workspace, "tea", url, replace=True)
+    publish(workspace, "tea", url)
     assert stored(url) == before
 
 
@@ -206,7 +204,7 @@ def test_files_of_others_stay(workspace, tmp_path):
     store = open_object_store(url)
     store.put("thesis.txt", b"irreplaceable")
     store.put("objects/17.json", b"an old shard")
-    publish(workspace, "tea", url, replace=True)
+    publish(workspace, "tea", url)
     assert (store.exists("thesis.txt"), store.exists("objects/17.json")) == (True, False)
     other = (tmp_path / "other").as_uri()
     open_object_store(other).put("thesis.txt", b"irreplaceable")
@@ -233,17 +231,17 @@ def test_objects_have_types_and_caching(workspace, s3_endpoint, s3_url):
 def test_unchanged_files_of_a_folder_are_not_written_again(workspace, out):
     publish(workspace, "tea", out)
     before = {path: path.stat() for path in out.rglob("*") if path.is_file()}
-    done = publish(workspace, "tea", out, replace=True)
+    done = publish(workspace, "tea", out)
     assert (done.written, done.kept) == (0, 8)
     assert {path: path.stat().st_ino for path in out.rglob("*") if path.is_file()} == {path: stat.st_ino for path, stat in before.items()}
     change_a_view(workspace)
-    done = publish(workspace, "tea", out, replace=True)
+    done = publish(workspace, "tea", out)
     assert (done.kept, done.archives) == (4, 8)
     verify_published(out, workspace)
     publish(workspace, "tea", out.with_name("reference"))
     assert current(contents(out)) == contents(out.with_name("reference"))
     assert {path.relative_to(out) for path in before} < {path.relative_to(out) for path in out.rglob("*") if path.is_file()}
-    publish(workspace, "tea", out, replace=True)
+    publish(workspace, "tea", out)
     assert contents(out) == contents(out.with_name("reference"))
 
 
@@ -257,11 +255,9 @@ def test_a_stopped_draft_never_changes_the_published_folder(workspace, out):
     for name in before:
         (draft / name).parent.mkdir(parents=True, exist_ok=True)
         os.link(out / name, draft / name)
-    with pytest.raises(AlreadyExists):
-        publish(workspace, "tea", out)
-    copy = contents(out)
-    publish(workspace, "tea", out, replace=True)
-    assert copy == before
+    publish(workspace, "tea", out, dry_run=True)
+    assert contents(out) == before
+    publish(workspace, "tea", out)
     assert contents(out) != before
     verify_published(out, workspace)
 
@@ -272,9 +268,9 @@ def test_a_dry_run_tells_what_would_be_written(workspace, out, tmp_path, again):
         publish(workspace, "tea", out)
         change_a_view(workspace)
     before = everything_but_locks(tmp_path)
-    plan = publish(workspace, "tea", out, replace=again, dry_run=True)
+    plan = publish(workspace, "tea", out, dry_run=True)
     assert everything_but_locks(tmp_path) == before
-    done = publish(workspace, "tea", out, replace=again)
+    done = publish(workspace, "tea", out)
     assert (plan.tiles, plan.archives, plan.removed, plan.kept) == (done.tiles, done.archives, done.removed, done.kept)
     assert plan.written == done.written - 1  # checksums.sha256 follows from the others
     assert {(row.part, row.view, row.layer) for row in plan.sizes} == {(row.part, row.view, row.layer) for row in done.sizes}
@@ -294,10 +290,10 @@ def test_archives_are_named_by_their_content(workspace, out):
     publish(workspace, "tea", out)
     names = {path.name: sha256(path.read_bytes()).hexdigest() for path in out.rglob("*.pmtiles")}
     change_a_view(workspace)
-    publish(workspace, "tea", out, replace=True)
+    publish(workspace, "tea", out)
     after = {path.name: sha256(path.read_bytes()).hexdigest() for path in out.rglob("*.pmtiles")}
     assert names.items() <= after.items()
-    publish(workspace, "tea", out, replace=True)
+    publish(workspace, "tea", out)
     after = {path.name: sha256(path.read_bytes()).hexdigest() for path in out.rglob("*.pmtiles")}
     assert len(names.keys() & after.keys()) == 4
     assert all(names[name] == after[name] for name in names.keys() & after.keys())
@@ -319,15 +315,15 @@ def test_archives_in_parts_hold_the_same_tiles_and_are_kept(workspace, tmp_path,
     assert json.loads((out / "rendering.json").read_text())["archive_part_bytes"] == PART_BYTES
     verify_published(out, workspace)
     before = contents(out)
-    done = publish(workspace, "tea", target, replace=True, max_file_bytes=PART_BYTES)
+    done = publish(workspace, "tea", target, max_file_bytes=PART_BYTES)
     assert (done.written, done.kept, done.removed, contents(out)) == (0, 8, 0, before)
-    assert publish(workspace, "tea", target, replace=True, max_file_bytes=PART_BYTES, dry_run=True).kept == 8
+    assert publish(workspace, "tea", target, max_file_bytes=PART_BYTES, dry_run=True).kept == 8
     parts[-1].write_bytes(b"cut")
     with pytest.raises(VerifyFailed, match="bytes, expected"):
         verify_published(out, workspace)
-    publish(workspace, "tea", target, replace=True)
+    publish(workspace, "tea", target)
     verify_published(out, workspace)
-    publish(workspace, "tea", target, replace=True)
+    publish(workspace, "tea", target)
     assert not [path for path in out.rglob("*.pmtiles") if path.name.count(".") > 1]
 
 

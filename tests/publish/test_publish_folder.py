@@ -11,6 +11,7 @@ from pmtiles.tile import Compression, TileType, zxy_to_tileid
 
 from map3d.errors import AlreadyExists, BadRequest, Corrupt, NotFound, Stopped
 from map3d.publish import publish
+from map3d.publish.checksums import CHECKSUMS, dump_checksums, file_digest, parse_checksums
 from map3d.registry import Registry
 from map3d.tiles import viewer_files
 from map3d.tiles.manifest import Manifest
@@ -72,7 +73,7 @@ def test_added_layers_are_published(workspace, out):
     publish(workspace, "tea", out)
     before = {view: archive(out, view, "color").read_bytes() for view in VIEWS}
     add_pass(workspace)
-    done = publish(workspace, "tea", out, replace=True)
+    done = publish(workspace, "tea", out)
     assert (done.tiles, done.archives) == (len(every_tile()) * 12, 12)
     for view in VIEWS:
         assert archive(out, view, "color").read_bytes() == before[view]
@@ -172,15 +173,48 @@ def test_publishing_twice_gives_equal_bytes(workspace, out):
     assert contents(out) == contents(out.with_name("again"))
 
 
-def test_a_published_folder_is_replaced_only_on_request(workspace, out):
+def test_a_published_folder_is_updated_and_files_of_others_in_it_stay(workspace, out):
     publish(workspace, "tea", out)
-    (out / "mark").touch()
-    with pytest.raises(AlreadyExists, match="--replace"):
-        publish(workspace, "tea", out)
-    assert (out / "mark").exists()
-    publish(workspace, "tea", out, replace=True)
-    assert not (out / "mark").exists()
+    before = contents(out)
+    (out / "CNAME").write_text("tea.example.org")
+    (out / "objects" / "17.json").write_text("an old shard")
+    publish(workspace, "tea", out)
+    assert contents(out) == before | {"CNAME": b"tea.example.org"}
     assert not list(out.parent.glob(".public*"))
+
+
+def other_map(kind):
+    """Returns what to replace in the manifest of a publication so that it is another city's."""
+    return ('"name": "tea"', '"name": "coffee"') if kind == "rendering" else ("691000.0", "691001.0")
+
+
+@pytest.mark.parametrize("kind", ["rendering", "scene"])
+@pytest.mark.parametrize("in_store", [False, True])
+def test_the_map_of_another_city_is_replaced_only_on_request(workspace, out, kind, in_store):
+    target = out.as_uri() if in_store else out
+    publish(workspace, "tea", target)
+    own = contents(out)
+    manifest, (old, new) = (out / "rendering.json").read_text(), other_map(kind)
+    assert old in manifest
+    (out / "rendering.json").write_text(manifest.replace(old, new))
+    sums = parse_checksums((out / CHECKSUMS).read_bytes()) | {"rendering.json": file_digest(out / "rendering.json")}
+    (out / CHECKSUMS).write_bytes(dump_checksums(sums))
+    before = contents(out)
+    for dry_run in (False, True):
+        with pytest.raises(AlreadyExists, match=rf"another {kind}.*--replace"):
+            publish(workspace, "tea", target, dry_run=dry_run)
+    assert contents(out) == before
+    publish(workspace, "tea", target, replace=True)
+    assert contents(out) == own
+
+
+@pytest.mark.parametrize("manifest", ["{", "[]", '{"map3d": "scene"}', '{"map3d": "rendering", "name": "tea"}'])
+def test_a_folder_with_another_kind_of_manifest_is_never_replaced(workspace, out, manifest):
+    out.mkdir()
+    (out / "rendering.json").write_text(manifest)
+    with pytest.raises(AlreadyExists, match="not a published rendering"):
+        publish(workspace, "tea", out, replace=True)
+    assert contents(out) == {"rendering.json": manifest.encode()}
 
 
 def test_other_folders_are_never_replaced(workspace, out):

@@ -1,5 +1,6 @@
 """The pages of the web interface, without a browser: what they show, ask for and refuse. The operations they ask for are really done."""
 
+import json
 import re
 import shutil
 from html import unescape
@@ -326,6 +327,15 @@ def test_rendering_from_the_form_to_the_map_and_away(town):
     town.work()
     assert (town.workspace.root / "published" / "shown" / "index.html").is_file()
     assert town.post("/studio/renderings/my-map/publish", folder="../../etc").status_code == 400
+    other = town.workspace.root / "published" / "other"
+    other.mkdir()
+    (other / "rendering.json").write_text('{"map3d": "rendering", "name": "harbour", "origin": [0, 0, 0]}')
+    refused = town.post("/studio/renderings/my-map/publish", folder="other")
+    assert (refused.status_code, "another rendering, harbour" in refused.text, "--replace" in refused.text) == (400, True, False)
+    town.post("/studio/renderings/my-map/publish", folder="other", replace="on")
+    town.work()
+    assert json.loads((other / "rendering.json").read_text())["name"] == "my-map"
+    shutil.rmtree(other)
 
     assert "published to published/shown" in town.get("/studio/operations/").text
     assert str(town.workspace.root) not in "".join(town.get(path).text for path in ("/studio/operations/", "/studio/", "/studio/renderings/my-map"))

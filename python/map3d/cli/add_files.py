@@ -10,12 +10,12 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from map3d.catalogue import Workspace
 from map3d.catalogue.records import LOCAL_CRS_NAME
 from map3d.cli.from_request import request_options
-from map3d.cli.import_reports import asset_warning_lines, place_line
+from map3d.cli.import_reports import asset_warning_lines, exit_for_files, place_line
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import print_json, print_table
 from map3d.cli.progress import progress_bar
 from map3d.ingest.file_notes import FileNote, note_lines
-from map3d.ingest.findings import skipped_count
+from map3d.ingest.findings import findings, skipped_count
 from map3d.messages import Message
 from map3d.requests import AddFiles
 
@@ -50,8 +50,7 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], request: Ad
         print_json({"imported": done, "failed": [{"source": path, **reason.named("error")} for path, reason in failed]})
     else:
         _print(place, scene, done, failed, result.ignored)
-    if failed:
-        raise click.exceptions.Exit(1)
+    exit_for_files(len(failed), (found for item in done for found in findings(item.report)))
 
 
 def _show(bar: Progress, task: Any) -> "OnFile":

@@ -10,7 +10,7 @@ from typing import Any, Final
 import click
 
 from map3d import __version__
-from map3d.errors import Map3dError
+from map3d.errors import FAILED, INTERRUPTED, Map3dError
 
 COMMANDS: Final = {
     "create-workspace": "create_workspace",
@@ -93,7 +93,7 @@ def cli() -> None:
 
 
 def main() -> None:
-    """Runs the command line and exits: 0 success, 1 failure, 2 invalid request, 3 published although files could not be read, 130 interrupted."""
+    """Runs the command line and exits with a code of `EXIT_CODES`."""
     sys.exit(run(sys.argv[1:]))
 
 
@@ -112,14 +112,14 @@ def run(arguments: list[str]) -> int:
         return error.exit_code
     except (click.Abort, KeyboardInterrupt):
         click.echo("map3d: stopped; re-run the command to resume", err=True)
-        return 130
+        return INTERRUPTED
     except BaseException as error:
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
             raise
         if os.environ.get("MAP3D_DEBUG"):
             traceback.print_exc()
         click.echo(f"map3d: {_line(error)}", err=True)
-        return error.exit_code if isinstance(error, Map3dError) else 1
+        return error.exit_code if isinstance(error, Map3dError) else FAILED
 
 
 def _usage_line(error: click.ClickException) -> str:

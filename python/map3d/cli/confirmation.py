@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import click
 
-from map3d.errors import BadRequest
+from map3d.errors import FAILED, BadRequest
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -26,4 +26,4 @@ def confirm(what: str, *, yes: bool) -> None:
         raise BadRequest(f"{what}; there is no terminal to confirm it at: run the command again with --yes")
     if not click.confirm(f"{what}. Continue?", err=True):
         click.echo("nothing was removed", err=True)
-        raise click.exceptions.Exit(1)
+        raise click.exceptions.Exit(FAILED)

@@ -1,11 +1,14 @@
 """Lines about imports, for people: what the import reports of a scene warn about, and where on Earth the scene is."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Final
 
+import click
+
 from map3d.catalogue import Catalogue, Workspace
-from map3d.ingest.findings import findings, sum_findings
+from map3d.errors import FAILED, IN_PART
+from map3d.ingest.findings import Finding, findings, sum_findings
 
 MAX_LINES: Final = 20
 
@@ -40,6 +43,14 @@ def asset_warning_lines(asset: str, report: Mapping[str, Any], limit: int = 8) -
     if (line := missing_textures_line({asset: report})) is not None:
         yield line
     yield from (f"{asset}: {found}" for found in findings(report)[:limit])
+
+
+def exit_for_files(failed: int, found: Iterable[Finding]) -> None:
+    """Exits with FAILED if files could not be read, with IN_PART if some were not read as a whole."""
+    if failed:
+        raise click.exceptions.Exit(FAILED)
+    if any(one.failed_file for one in found):
+        raise click.exceptions.Exit(IN_PART)
 
 
 def place_line(workspace: Workspace, catalogue: Catalogue, name: str) -> str | None:

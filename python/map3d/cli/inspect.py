@@ -9,6 +9,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from map3d.cli.file_tables import MAX_ROWS, findings_lines, kinds_text, print_files, textures_text
 from map3d.cli.from_request import request_options
+from map3d.cli.import_reports import exit_for_files
 from map3d.cli.options import json_option
 from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.progress import progress_bar
@@ -42,8 +43,7 @@ def command(files: Sequence[Path], request: Inspect, as_json: bool) -> None:
         print_json(found)
     else:
         _print(found)
-    if found.failed:
-        raise click.exceptions.Exit(1)
+    exit_for_files(len(found.failed), (one for file in found.files for one in file.findings))
 
 
 def _show(bar: Progress, task: Any) -> "OnFile":

@@ -20,6 +20,7 @@ from map3d.cli.options import json_option, workspace_option
 from map3d.cli.ordered_group import OrderedGroup
 from map3d.cli.output import counts_text, plural, print_json, size_text
 from map3d.cli.progress import progress_bar, show_stage
+from map3d.errors import FAILED
 from map3d.requests.scenes import WorkLimits
 from map3d.types import BlockId
 
@@ -205,7 +206,7 @@ def reproduce_block(
         for item in found:
             _print_reproduction(item)
     if not all(item.is_done for item in found):
-        raise click.exceptions.Exit(1)
+        raise click.exceptions.Exit(FAILED)
 
 
 def _print_reproduction(item: "Reproduction") -> None:

@@ -13,6 +13,7 @@ from map3d.cli.from_request import request_options
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import plural, print_json, size_text
 from map3d.cli.render_stats import print_summary, summary
+from map3d.errors import FAILED, INTERRUPTED
 from map3d.requests import Render
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def command(workspace: Workspace, rendering: str, request: Render, with_stats: b
         if with_stats:
             print_summary(summary(result.stats))
     if not result.complete:
-        raise click.exceptions.Exit(130 if result.stopped else 1)
+        raise click.exceptions.Exit(INTERRUPTED if result.stopped else FAILED)
 
 
 def _dask_pools(

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import click
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
@@ -17,6 +17,7 @@ from map3d.cli.output import names_text, plural, size_text
 from map3d.cli.progress import progress_bar
 from map3d.cli.publish import publish_with_progress
 from map3d.cli.render import print_result, render_with_progress
+from map3d.errors import FAILED, IN_PART, INTERRUPTED
 from map3d.ingest.file_notes import note_lines
 from map3d.ingest.findings import failed_count, skipped_count, warning_count
 from map3d.messages import Message
@@ -24,10 +25,6 @@ from map3d.requests import Site
 
 if TYPE_CHECKING:
     from map3d.site.files import ImportSummary
-
-
-PUBLISHED_IN_PART: Final = 3
-"""Exit code: the site is published, and files could not be read."""
 
 
 @click.command("site")
@@ -44,23 +41,27 @@ def command(workspace: Workspace, request: Site) -> None:
     from map3d.ingest.asset_names import asset_name
     from map3d.jobs.run import Run
     from map3d.jobs.run_settings import RunSettings
-    from map3d.publish import check_folder
+    from map3d.publish.folder_target import check_folder
     from map3d.publish.report_page import REPORT_PAGE
+    from map3d.publish.target import MapIdentity
     from map3d.scenes.style import choose_style
     from map3d.site.steps import create_site_rendering, store_report
+    from map3d.tiles.viewer_files import viewer_folder
 
     out, workers, memory = request.out, request.processes, request.max_memory_bytes
-    check_folder(out)
     settings = RunSettings(workers, memory)
     settings.check()
     folder_name = request.folder.resolve().stem
     request = replace(request, name=request.name or asset_name(folder_name), title=request.title or folder_name)
+    viewer_folder()
+    check_folder(out, MapIdentity(request.name), request.replace)
     with workspace.create().open_catalogue() as catalogue:
         summary = _update_files(workspace, catalogue, request)
         failed = len(summary.failed) + sum(failed_count(asset.report) for asset in catalogue.assets(request.name))
         if not catalogue.assets(request.name):
             click.echo(f"the scene {request.name} has no files left; {out} stays as it was published")
             return
+        check_folder(out, MapIdentity(request.name, catalogue.scene(request.name).origin), request.replace)
         choose_style(catalogue, request.name, request.style or {"rules": []})
         built = build_with_progress(workspace, catalogue, request.name, threads=workers, max_memory_bytes=memory)
         print_extents(workspace, catalogue, request.name, was_built=built is not None)
@@ -74,13 +75,13 @@ def command(workspace: Workspace, request: Site) -> None:
         store_report(workspace, catalogue, request, made, summary, workers, seconds)
     print_result(record.name, result)
     if not result.complete:
-        raise click.exceptions.Exit(130 if result.stopped else 1)
-    done = publish_with_progress(workspace, record.name, out, replace=True)
+        raise click.exceptions.Exit(INTERRUPTED if result.stopped else FAILED)
+    done = publish_with_progress(workspace, record.name, out, replace=request.replace)
     click.echo(f"wrote the site to {out}, {size_text(done.bytes)}; copy it to any web server that supports range requests")
     click.echo(f"report: {out / REPORT_PAGE} says what the files hold and what was skipped")
     if failed:
         click.echo(f"published, but {plural(failed, 'file')} could not be read, or not as a whole", err=True)
-        raise click.exceptions.Exit(PUBLISHED_IN_PART)
+        raise click.exceptions.Exit(IN_PART)
 
 
 def _update_files(workspace: Workspace, catalogue: Catalogue, request: Site) -> "ImportSummary":

@@ -10,6 +10,7 @@ from map3d.catalogue import Workspace
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import counts_text, plural, print_json
 from map3d.cli.progress import progress_bar, show_stage
+from map3d.errors import FAILED
 
 
 @click.command("verify")
@@ -64,7 +65,7 @@ def command(
             click.echo(line)
         click.echo(f"{plural(findings.total, 'problem')} found" if findings.total else "no problems found")
     if findings.total:
-        raise click.exceptions.Exit(1)
+        raise click.exceptions.Exit(FAILED)
 
 
 def _verify_published(folder: Path, as_json: bool) -> None:

@@ -8,7 +8,7 @@ from map3d.catalogue import Workspace
 from map3d.cli.from_request import request_options
 from map3d.cli.options import json_option, workspace_option
 from map3d.cli.output import plural, print_json, size_text
-from map3d.errors import BadRequest
+from map3d.errors import FAILED, BadRequest
 from map3d.requests.scenes import WorkLimits
 
 
@@ -47,7 +47,7 @@ def command(workspace: Workspace, renderings: tuple[str, ...], request: WorkLimi
         for name in result.incomplete:
             click.echo(f"{name} is incomplete; see map3d jobs {name}", err=True)
     if result.incomplete:
-        raise click.exceptions.Exit(1)
+        raise click.exceptions.Exit(FAILED)
 
 
 def do_operations(workspace: Workspace, renderings: tuple[str, ...], *, forever: bool, as_json: bool) -> None:

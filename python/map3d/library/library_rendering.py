@@ -106,7 +106,8 @@ class LibraryRendering:
         max_file_bytes: int | None = None,
         progress: OnProgress | None = None,
     ) -> Published:
-        """Writes a folder for any static web host, or sends it to the URL of an object store. Raises AlreadyExists, BadRequest (incomplete)."""
+        """Writes a folder for any static web host, or sends it to the URL of an object store. A publication of the
+        same rendering is updated; `replace` replaces that of another one. Raises AlreadyExists, BadRequest (incomplete)."""
         how: dict[str, Any] = {"replace": replace, "allow_incomplete": allow_incomplete, "dry_run": dry_run, "url": url, "gis": gis}
         how["max_file_bytes"] = max_file_bytes
         return publish(self._workspace, self.name, str(out), progress=publishing(progress), **how)

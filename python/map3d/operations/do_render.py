@@ -60,7 +60,7 @@ def published_folder(workspace: Workspace, operation: OperationRecord) -> Path:
 
 
 def do_publish(workspace: Workspace, catalogue: Catalogue, operation: OperationRecord, report: OperationReport) -> Message:
-    folder, request = published_folder(workspace, operation), from_json(Publish, operation.arguments, replace=True)
+    folder, request = published_folder(workspace, operation), from_json(Publish, operation.arguments)
     folder.parent.mkdir(exist_ok=True)
 
     def progress(stage: str, done: int, total: int) -> bool:

@@ -7,7 +7,9 @@ from map3d.catalogue import Catalogue, OperationRecord, Workspace
 from map3d.errors import BadRequest, NotFound
 from map3d.operations.arguments import check_arguments
 from map3d.operations.uploaded_files import check_host_path, find_upload
-from map3d.publish.published_folders import FOLDER, find_published, folders_of
+from map3d.publish.folder_target import check_folder
+from map3d.publish.published_folders import FOLDER, find_published, folders_of, published_path
+from map3d.publish.target import MapIdentity
 from map3d.quantities import names_text
 
 
@@ -17,13 +19,15 @@ def request_operation(
     """Stores an operation for the next operation worker, after checking everything that can be checked now.
 
     Raises NotFound for an unknown target, upload, path or asset; BadRequest for wrong arguments, incomplete uploads and paths outside the allowed
-    folders.
+    folders; AlreadyExists for a published folder that holds another map.
     """
     check_arguments(kind, target, arguments)
     if kind == "import":
         _check_files(workspace, arguments, asked_by)
     if kind == "remove":
         _check_removal(workspace, catalogue, target, arguments)
+    if kind == "publish":
+        _check_publication(workspace, catalogue, target, arguments)
     return catalogue.create_operation(kind, target, arguments, asked_by)
 
 
@@ -32,6 +36,13 @@ def _check_files(workspace: Workspace, arguments: Mapping[str, Any], user: str) 
         find_upload(workspace, id, user)
     for path in arguments.get("paths", ()):
         check_host_path(path)
+
+
+def _check_publication(workspace: Workspace, catalogue: Catalogue, target: str, arguments: Mapping[str, Any]) -> None:
+    """Raises AlreadyExists for a folder that holds another map, unless it is to be replaced."""
+    folder, record = str(arguments.get("folder", target)), catalogue.rendering(target)
+    own = MapIdentity(record.name, catalogue.scene(record.scene).origin)
+    check_folder(published_path(workspace, folder), own, bool(arguments.get("replace")), f"folder {folder}", "the option replace")
 
 
 def _check_removal(workspace: Workspace, catalogue: Catalogue, target: str, arguments: Mapping[str, Any]) -> None:

@@ -1,5 +1,5 @@
 """A rendering as static files: in a folder, to copy anywhere, or in an object store."""
 
-from map3d.publish.publish_rendering import Published, check_folder, publish
+from map3d.publish.publish_rendering import Published, publish
 
-__all__ = ["Published", "check_folder", "publish"]
+__all__ = ["Published", "publish"]

@@ -7,10 +7,10 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from map3d.errors import AlreadyExists, Corrupt
+from map3d.errors import Corrupt
 from map3d.publish.checksums import CHECKSUMS, UNKNOWN, dump_checksums, file_digest, parse_checksums
 from map3d.publish.pmtiles_archive import Archive, existing_parts, split_archive
-from map3d.publish.target import KeptArchive, Target
+from map3d.publish.target import KeptArchive, MapIdentity, Target, check_publication
 from map3d.tiles.manifest import FILE_NAME
 
 
@@ -22,8 +22,8 @@ class FolderTarget(Target):
         self.folder = folder.absolute()
         self.draft = draft_of(self.folder)
 
-    def start(self, replace: bool) -> None:
-        _check_folder(self.folder, replace)
+    def start(self, own: MapIdentity, replace: bool) -> None:
+        check_folder(self.folder, own, replace)
         if not self.folder.is_dir():
             return
         sums = self.folder / CHECKSUMS
@@ -69,8 +69,8 @@ class FolderTarget(Target):
     def finish(self) -> None:
         self.add(CHECKSUMS, dump_checksums(self.digests))
         self._remove_leftovers()
-        self.divide_old(self.old_sizes)
-        for name in self.kept_for_open_maps:
+        self.divide_old()
+        for name in self.old_sizes.keys() - self.digests.keys() - set(self.removed):
             _link(self.folder / name, self.draft / name)
         _replace_folder(self.draft, self.folder)
 
@@ -104,13 +104,12 @@ def count_finished_tiles(path: Path, metadata: dict[str, Any], part_bytes: int =
         return 0
 
 
-def _check_folder(folder: Path, replace: bool) -> None:
+def check_folder(folder: Path, own: MapIdentity, replace: bool, where: str | None = None, option: str = "--replace") -> None:
+    """Checks whether a map can be published to a folder. `where` and `option`: as `check_publication` has them. Raises AlreadyExists."""
     if not folder.exists() or (folder.is_dir() and not any(folder.iterdir())):
         return
-    if not folder.is_dir() or not (folder / FILE_NAME).is_file():
-        raise AlreadyExists(f"{folder}: exists and is not a published rendering; name another folder")
-    if not replace:
-        raise AlreadyExists(f"{folder}: already contains a published rendering; replace it with --replace, or name another folder")
+    manifest = folder / FILE_NAME
+    check_publication(manifest.read_bytes() if manifest.is_file() else None, own, where or str(folder), replace, option)
 
 
 def _link(source: Path, path: Path) -> None:

@@ -24,7 +24,7 @@ from map3d.publish.preview_picture import make_preview
 from map3d.publish.report_page import report_files
 from map3d.publish.size_report import SizeRow, report_sizes
 from map3d.publish.store_target import StoreTarget
-from map3d.publish.target import LAST, DryRun, Target
+from map3d.publish.target import LAST, DryRun, MapIdentity, Target
 from map3d.scenes.scene_cache import open_registry
 from map3d.site.report import read_report
 from map3d.tiles.manifest import FILE_NAME, Manifest, ManifestView
@@ -118,7 +118,8 @@ def publish(
 ) -> Published:
     """Publishes to a folder, or to an object store when `out` is a URL such as s3://BUCKET/PREFIX.
 
-    `replace`: updates an earlier publication; `dry_run`: writes nothing; `url`: address at which people will open the map, for the picture of links;
+    A publication of the same rendering is updated. `replace`: replaces that of another one; `dry_run`: writes nothing; `url`: address at which
+    people will open the map, for the picture of links;
     `gis`: also writes colour tiles as files, with layer definitions for QGIS and GDAL, which read no archives. The definitions name the tiles by
     `url`, else by the path of the folder. `max_file_bytes`: divides archives into files of this size, for hosts with a limit.
 
@@ -133,7 +134,7 @@ def publish(
     tiles_at = _gis_address(out, url) if gis else None
     publisher = _Publisher(workspace, record, manifest, target, progress or (lambda *_: True))
     try:
-        target.start(replace)
+        target.start(MapIdentity(manifest.name, manifest.origin), replace)
         target.part_bytes = max_file_bytes or 0
         publisher.write(url, tiles_at)
         target.finish()
@@ -163,13 +164,6 @@ def _gis_address(out: Path | str, url: str | None) -> str:
     if not isinstance(out, Path) and "://" in out:
         raise BadRequest(f"{out}: layer definitions for GIS software need the address of the tiles; give --url ADDRESS")
     return Path(out).absolute().as_uri()
-
-
-def check_folder(folder: Path) -> None:
-    """Checks before a long render whether a folder can be published to, or published to again. Raises AlreadyExists for another's files, and
-    ViewerMissing."""
-    viewer_folder()
-    FolderTarget(folder).start(replace=True)
 
 
 def _open_target(workspace: Workspace, rendering: str, out: Path | str) -> Target:

@@ -17,7 +17,7 @@ from map3d.errors import AlreadyExists
 from map3d.object_store import ObjectStore
 from map3d.publish.checksums import CHECKSUMS, UNKNOWN, dump_checksums, file_digest, parse_checksums
 from map3d.publish.pmtiles_archive import split_archive
-from map3d.publish.target import LAST, KeptArchive, Target, is_named_by_content, is_written_by_publish
+from map3d.publish.target import LAST, KeptArchive, MapIdentity, Target, check_publication, is_named_by_content
 from map3d.tiles.manifest import FILE_NAME
 
 PARALLEL_REQUESTS: Final = 16
@@ -57,14 +57,15 @@ class StoreTarget(Target):
         self._pool = ThreadPoolExecutor(PARALLEL_REQUESTS)
         self._waiting: deque[Future[str]] = deque()
 
-    def start(self, replace: bool) -> None:
+    def start(self, own: MapIdentity, replace: bool) -> None:
         self.old_sizes = dict(self._store.list())
         sums = self._store.get(CHECKSUMS)
         if self.old_sizes and sums is None:
             raise AlreadyExists(f"{self.url}: contains objects and is not a published rendering; name another prefix")
         self.old_digests = parse_checksums(None if sums is None else sums[0])
-        if FILE_NAME in self.old_sizes and not replace:
-            raise AlreadyExists(f"{self.url}: already contains a published rendering; replace it with --replace, or name another prefix")
+        if FILE_NAME in self.old_sizes:
+            manifest = self._store.get(FILE_NAME)
+            check_publication(None if manifest is None else manifest[0], own, self.url, replace)
         self._journal = {name: digest for name, digest in self.old_digests.items() if name in self.old_sizes}
 
     def find_archive(self, name: str, metadata: dict[str, Any]) -> KeptArchive | None:
@@ -104,8 +105,7 @@ class StoreTarget(Target):
 
     def finish(self) -> None:
         self._wait(0)
-        present = {*self.old_digests, *filter(is_written_by_publish, self.old_sizes)} & self.old_sizes.keys()
-        self.divide_old(present)
+        self.divide_old()
         sums = dump_checksums(self.digests)
         if self.removed and not self._overwriting:
             self._mark_overwritten()

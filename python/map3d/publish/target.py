@@ -1,5 +1,6 @@
 """What a rendering is published to, and which files it consists of."""
 
+import json
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Collection
@@ -9,10 +10,12 @@ from itertools import count, takewhile
 from pathlib import Path
 from typing import Any, Final
 
+from map3d.errors import AlreadyExists
 from map3d.publish.checksums import CHECKSUMS, UNKNOWN
 from map3d.publish.pmtiles_archive import part_path
 from map3d.tiles.manifest import FILE_NAME
 from map3d.tiles.viewer_files import PAGE
+from map3d.types import Vec3
 
 SEARCH_ROOT: Final = "objects/search.json"
 LAST: Final = (SEARCH_ROOT, PAGE, FILE_NAME)
@@ -30,6 +33,46 @@ def is_named_by_content(name: str) -> bool:
 def is_written_by_publish(name: str) -> bool:
     """Whether only `map3d publish` writes files of such a name, so that one which is no longer part of the rendering may be deleted."""
     return is_named_by_content(name) or _DOCUMENT.fullmatch(name) is not None
+
+
+@dataclass(frozen=True)
+class MapIdentity:
+    """What tells the map of one city from that of another: the name of the rendering, and the origin of its scene, which never changes; None while
+    the scene has none."""
+
+    name: str
+    origin: Vec3 | None = None
+
+    def is_same(self, other: "MapIdentity") -> bool:
+        return self.name == other.name and (None in (self.origin, other.origin) or self.origin == other.origin)
+
+
+def read_identity(manifest: bytes) -> MapIdentity | None:
+    """Returns whose publication a manifest of any version belongs to; None for a file that is no manifest of map3d."""
+    try:
+        value = json.loads(manifest)
+        if value["map3d"] != "rendering":
+            return None
+        x, y, z = (float(number) for number in value["origin"])
+        return MapIdentity(str(value["name"]), (x, y, z))
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def check_publication(manifest: bytes | None, own: MapIdentity, where: str, replace: bool, option: str = "--replace") -> None:
+    """Checks that a folder or store, which is not empty, may be published to. `manifest`: its `rendering.json`, or None; `option`: what
+    replaces another city's map, as the front that asks names it. Raises AlreadyExists, with `where` in its message."""
+    found = None if manifest is None else read_identity(manifest)
+    if found is None:
+        raise AlreadyExists(f"{where}: contains files and is not a published rendering; name another place")
+    if replace or own.is_same(found):
+        return
+    other = (
+        f"the map of another rendering, {found.name}"
+        if found.name != own.name
+        else f"the map of another scene, whose rendering is called {found.name} too"
+    )
+    raise AlreadyExists(f"{where}: contains {other}; name another place, or give {option} to replace that map")
 
 
 @dataclass(frozen=True)
@@ -60,8 +103,8 @@ class Target(ABC):
         self.old_sizes: dict[str, int] = {}
 
     @abstractmethod
-    def start(self, replace: bool) -> None:
-        """Reads the present state. Raises AlreadyExists for another's files, or for a published rendering without `replace`."""
+    def start(self, own: MapIdentity, replace: bool) -> None:
+        """Reads the present state. Raises AlreadyExists as `check_publication` does."""
 
     @abstractmethod
     def find_archive(self, name: str, metadata: dict[str, Any]) -> KeptArchive | None:
@@ -83,9 +126,11 @@ class Target(ABC):
     def finish(self) -> None:
         """Writes the checksums and removes what no longer belongs."""
 
-    def divide_old(self, present: Collection[str]) -> None:
-        """Divides the files present that are not part of the new state into those that stay for open maps and those to be removed."""
-        old = sorted(set(present) - self.digests.keys() - {CHECKSUMS})
+    def divide_old(self) -> None:
+        """Divides the files of the old publication that are not part of the new state into those that stay for open maps and those to be removed.
+        Files that publish did not write are in neither list and stay."""
+        present = {*self.old_digests, *filter(is_written_by_publish, self.old_sizes)} & self.old_sizes.keys()
+        old = sorted(present - self.digests.keys() - {CHECKSUMS})
         self.kept_for_open_maps = [name for name in old if is_named_by_content(name) and self.old_digests.get(name, UNKNOWN) != UNKNOWN]
         self.removed = sorted(set(old) - set(self.kept_for_open_maps))
 
@@ -118,8 +163,8 @@ class DryRun(Target):
         super().__init__(target.url)
         self._target = target
 
-    def start(self, replace: bool) -> None:
-        self._target.start(replace)
+    def start(self, own: MapIdentity, replace: bool) -> None:
+        self._target.start(own, replace)
         self.old_digests, self.old_sizes = self._target.old_digests, self._target.old_sizes
 
     def find_archive(self, name: str, metadata: dict[str, Any]) -> KeptArchive | None:
@@ -147,5 +192,4 @@ class DryRun(Target):
         self._target.close()
 
     def finish(self) -> None:
-        present = {*self.old_digests, *(name for name in self.old_sizes if is_written_by_publish(name))} & self.old_sizes.keys()
-        self.divide_old(present)
+        self.divide_old()

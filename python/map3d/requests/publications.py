@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 from map3d.requests.param import Front, param
 from map3d.types import ViewAngles
@@ -13,6 +13,14 @@ EXPORT_FORMATS: Final[tuple[ExportFormat, ...]] = ("mbtiles", "xyz", "dzi")
 
 _SERVER: Final[tuple[Front, ...]] = ("rest", "studio")
 _LOCAL: Final[tuple[Front, ...]] = ("cli", "library")
+
+
+def replace_param() -> Any:
+    return param(
+        False,
+        help="Replace the published map of another rendering. That of the same rendering is updated without it.",
+        label="Replace the map of another rendering in this folder",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,11 +42,7 @@ class Publish:
         label="Folder",
         lacks=dict.fromkeys(_LOCAL, "they name any folder or object store"),
     )
-    replace: bool = param(
-        False,
-        help="Update an earlier publication: only files whose content changed are written or sent.",
-        lacks=dict.fromkeys(_SERVER, "always set, so that a repeated operation completes the first one"),
-    )
+    replace: bool = replace_param()
     allow_incomplete: bool = param(False, help="Publish even if blocks are missing.", label="Publish even if blocks are missing")
     url: str | None = param(
         None,

@@ -6,6 +6,7 @@ from pathlib import Path
 from map3d.geometry.views import DEFAULT_PITCH_DEG, views_around
 from map3d.requests.heights import HeightChoice
 from map3d.requests.param import param
+from map3d.requests.publications import replace_param
 from map3d.requests.reading import FormatOptions, crs_param
 from map3d.requests.renderings import DEFAULT_DIRECTIONS, color_param, data_param, res_param, small_param
 from map3d.requests.scenes import ContentChoice, WorkLimits
@@ -18,6 +19,7 @@ class Site(FormatOptions, HeightChoice, ContentChoice, WorkLimits):
 
     folder: Path = param(help="Folder of the files.", argument=True)
     out: Path = param(help="Output folder of the site.", option="-o/--out")
+    replace: bool = replace_param()
     name: str = param("", help="Name of scene and rendering.", words="from the folder")
     title: str = param("", help="Display title.", words="name of the folder")
     attribution: str = param("", help="Attribution text.")
