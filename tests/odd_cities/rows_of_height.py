@@ -1,23 +1,32 @@
 """Rows of the table of contradictions about heights, and about objects that several files have."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from pyproj import Transformer
 
-from tests.coherence.documents import EAST, NORTH, UTM, town, write_dem, write_flat, write_houses, write_photo
+from tests.coherence.documents import EAST, NORTH, STEP_M, UTM, town, write_dem, write_flat, write_houses, write_photo
 from tests.odd_cities.contradictions import Row
 
 _TO_DEGREES = Transformer.from_crs(UTM, "EPSG:4326", always_xy=True)
 TOWN = _TO_DEGREES.transform(EAST + 65.0, NORTH + 64.0)
-"""Longitude and latitude of the middle of the town, and of that of the terrain below it."""
+TILES = _TO_DEGREES.transform(EAST + 65.0, NORTH + 124.0)
+"""Longitude and latitude of the middle of the town, of two towns, and of the terrain below them."""
 TERRAIN = _TO_DEGREES.transform(EAST + 100.0, NORTH + 100.0)
 
 
 def _on_terrain(folder: Path, *, factor: float = 1.0, base: float | None = None, above: float = 0.0) -> None:
     write_houses(folder / "town.gml", town(base=base, above=above, factor=factor))
     write_dem(folder / "dem.tif")
+
+
+def _tiles(folder: Path, *, base: float | None = None, above: float = 0.0, factor: float = 1.0) -> None:
+    """Writes a town, and a smaller one north of it whose heights differ."""
+    write_houses(folder / "south.gml", town("s"))
+    houses = town("n", base=base, above=above, factor=factor, side=3)
+    write_houses(folder / "north.gml", [replace(house, y=house.y + 4 * STEP_M) for house in houses])
 
 
 def _with(write: Callable[[Path], object], folder: Path) -> None:
@@ -45,6 +54,7 @@ def _stray(folder: Path) -> None:
 
 
 TOWN_M = (130.0, 128.0, 9.0)
+TILES_M = (130.0, 248.0)
 TERRAIN_M = (400.0, 400.0)
 
 HEIGHT: list[Row] = [
@@ -60,6 +70,12 @@ HEIGHT: list[Row] = [
     Row("heights in feet", partial(_on_terrain, factor=1 / 0.3048), TERRAIN, (*TERRAIN_M, 1205.9), 17, ("heights-in-feet",), textures=1),
     Row("the same, read so", partial(_on_terrain, factor=1 / 0.3048), TERRAIN, (*TERRAIN_M, 19.9), 17, (), {"height_unit": "ft"}, textures=1),
     Row("one house 520 m below the others", _stray, TOWN, (130.0, 128.0, 529.0), 16, ("objects-off-ground",)),
+    Row("a tile 500 m below the one beside it", partial(_tiles, above=-500.0), TILES, (*TILES_M, 515.0), 25, ("heights-unlike-file",)),
+    Row("the same tile, moved", partial(_tiles, above=-500.0), TILES, (*TILES_M, 15.0), 25, ("heights-moved",), {"heights": "500"}),
+    Row("a tile at 0 beside another", partial(_tiles, base=0.0), TILES, (*TILES_M, 520.0), 25, ("heights-at-zero-beside-file",)),
+    Row("the same tile, set on the ground", partial(_tiles, base=0.0), TILES, (*TILES_M, 15.0), 25, ("objects-clamped",), {"heights": "clamp"}),
+    Row("a tile on the ellipsoid", partial(_tiles, above=46.5), TILES, (*TILES_M, 59.5), 25, ("heights-ellipsoidal-beside-file",)),
+    Row("a tile in feet", partial(_tiles, factor=1 / 0.3048), TILES, (*TILES_M, 1194.6), 25, ("heights-in-feet-beside-file",)),
     Row("roads without heights", partial(_with, _roads), TOWN, TOWN_M, 17, ("flat-objects-draped", "polygon-without-height")),
     Row(
         "a photo without elevation model",

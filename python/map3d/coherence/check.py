@@ -20,7 +20,8 @@ from map3d.catalogue.records import HEIGHTS_DIFFER
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.coherence.datums import share_heights
 from map3d.coherence.ground import Ground, find_ground, terrain_surfaces
-from map3d.coherence.heights import HeightDecision, decide_heights
+from map3d.coherence.height_rules import CLAMP, HEIGHTS, OF_FILES, HeightRules, with_choice, with_choice_of_files
+from map3d.coherence.heights import HeightDecision, decide_heights, settled_ground
 from map3d.coherence.same_objects import find_same_objects
 from map3d.coherence.surveyed_assets import Flags, SurveyedAsset
 from map3d.geometry.crs import horizontal_crs, parse_crs
@@ -29,15 +30,12 @@ from map3d.ingest.asset import left_out, local_box, world_boxes
 from map3d.ingest.findings import CONTRADICTIONS, finding
 from map3d.ingest.unfinished_imports import finish_imports
 from map3d.registry import Registry
-from map3d.requests.heights import BY_EVIDENCE, HeightRule, parse_heights
 from map3d.types import Vec3
 
 FILE: Final = "coherence.json"
-VERSION: Final = 1
-HEIGHTS: Final = "heights"
-CLAMP: Final = "clamp"
-"""Keys in `SceneRecord.options`."""
-NO_CLASSES: Final = "none"
+VERSION: Final = 2
+OPTIONS: Final = (HEIGHTS, CLAMP, OF_FILES)
+"""Options of a scene on which a check depends."""
 
 ADJUSTMENTS: Final = "adjustments.m3h"
 DRAPED: Final = "draped.m3a"
@@ -53,17 +51,18 @@ class CheckedScene:
 
 
 def choose_heights(catalogue: Catalogue, scene: str, heights: str | None, clamp: Sequence[str]) -> None:
-    """Sets how the next check treats heights; None and no classes leave a choice as it is, "auto" and "none" take it back. Raises BadRequest."""
+    """Sets how the next check treats the heights of files without a choice of their own.
+
+    None and no classes leave a choice as it is, "auto" and "none" take it back. Raises BadRequest.
+    """
     record = catalogue.scene(scene)
-    options = dict(record.options)
-    for name, value, without in ((HEIGHTS, heights, BY_EVIDENCE), (CLAMP, list(clamp), [NO_CLASSES])):
-        if value == without:
-            options.pop(name, None)
-        elif value:
-            options[name] = value
-    _rule(options)
-    if options != dict(record.options):
-        catalogue.set_scene_options(scene, options)
+    _set_options(catalogue, record, with_choice(record.options, heights, clamp))
+
+
+def choose_file_heights(catalogue: Catalogue, scene: str, assets: Sequence[str], heights: str | None, clamp: Sequence[str]) -> None:
+    """As `choose_heights`, for the files of some assets, which may be imported later."""
+    record = catalogue.scene(scene)
+    _set_options(catalogue, record, with_choice_of_files(record.options, assets, heights, clamp))
 
 
 def check_scene(workspace: Workspace, catalogue: Catalogue, scene: str) -> None:
@@ -86,7 +85,8 @@ def check_locked_scene(workspace: Workspace, catalogue: Catalogue, scene: str) -
     surveyed = [SurveyedAsset(asset, folders[asset.name]) for asset in assets]
     same = find_same_objects(surveyed)
     ground = find_ground(surveyed, same.kept)
-    decisions = decide_heights(surveyed, same.kept, ground, _rule(record.options), _geoid_m(record, surveyed))
+    decisions = decide_heights(surveyed, same.kept, ground, HeightRules.of(record.options), geoid_m(record, surveyed))
+    ground = settled_ground(surveyed, same.kept, decisions, ground)
     adjusted = _adjust(surveyed, same.kept, decisions, ground)
     with Registry(workspace.registry_path(scene)) as registry:
         for asset in surveyed:
@@ -110,7 +110,7 @@ def is_checked(workspace: Workspace, catalogue: Catalogue, record: SceneRecord) 
 def check_key(record: SceneRecord, assets: Sequence[AssetRecord]) -> str:
     """Returns a digest of everything that a check depends on."""
     crs = None if record.crs is None else record.crs.wkt
-    text = json.dumps([VERSION, [(a.name, a.digest) for a in assets], crs, record.options.get(HEIGHTS), record.options.get(CLAMP)], sort_keys=True)
+    text = json.dumps([VERSION, [(a.name, a.digest) for a in assets], crs, *(record.options.get(name) for name in OPTIONS)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
@@ -123,18 +123,18 @@ def read_check(workspace: Workspace, scene: str) -> CheckedScene:
     return CheckedScene(value["key"], tuple(value["adjusted"]))
 
 
+def _set_options(catalogue: Catalogue, record: SceneRecord, options: Mapping[str, Any]) -> None:
+    if options != dict(record.options):
+        catalogue.set_scene_options(record.name, options)
+
+
 def _choose_option(catalogue: Catalogue, record: SceneRecord, name: str, value: Any) -> None:
     """Sets an option of a scene, or removes it if the value is empty."""
-    if value != record.options.get(name, False):
-        others = {key: other for key, other in record.options.items() if key != name}
-        catalogue.set_scene_options(record.name, {**others, name: value} if value else others)
+    others = {key: other for key, other in record.options.items() if key != name}
+    _set_options(catalogue, record, {**others, name: value} if value else others)
 
 
-def _rule(options: Mapping[str, Any]) -> HeightRule:
-    return parse_heights(options.get(HEIGHTS), tuple(options.get(CLAMP, ())))
-
-
-def _geoid_m(record: SceneRecord, assets: Sequence[SurveyedAsset]) -> float | None:
+def geoid_m(record: SceneRecord, assets: Sequence[SurveyedAsset]) -> float | None:
     """Returns the geoid above the ellipsoid in the middle of the scene; None in local metres."""
     boxes = [asset.boxes[asset.drawn] for asset in assets if not asset.has_heights and asset.drawn.any()]
     if record.crs is None or record.crs.wkt is None or not boxes:

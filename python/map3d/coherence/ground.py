@@ -18,17 +18,17 @@ _INSET: Final = 0.1
 
 @dataclass(frozen=True)
 class Ground:
-    """`terrain`, `between`: asset → (wholes,) heights below each whole, NaN where there is none: the lowest of terrain at five points of its box, and
-    of the grid between bases at its centre. `surfaces`: of the terrain."""
+    """`terrain`: asset → (wholes,) the lowest height of the terrain at five points of the box of each whole, NaN where there is none. `surfaces`: of
+    the terrain; `grid`: between the bases of objects."""
 
     terrain: Mapping[str, Floats]
-    between: Mapping[str, Floats]
     surfaces: Sequence[_core.Surface]
     grid: GroundGrid | None
 
-    def below(self, asset: str) -> Floats:
-        """Returns (wholes,) the terrain or, where there is none, the ground between bases."""
-        return np.where(np.isfinite(self.terrain[asset]), self.terrain[asset], self.between[asset])
+    def below(self, asset: SurveyedAsset) -> Floats:
+        """Returns (wholes,) the terrain or, where there is none, the ground between bases; NaN without either."""
+        terrain = self.terrain[asset.name]
+        return np.where(np.isfinite(terrain), terrain, _between(asset, self.grid))
 
 
 def find_ground(assets: Sequence[SurveyedAsset], kept: Mapping[str, Flags]) -> Ground:
@@ -41,9 +41,9 @@ def find_ground(assets: Sequence[SurveyedAsset], kept: Mapping[str, Flags]) -> G
     else:
         heights = [np.full(len(p), np.nan) for p in points.values()]
     terrain = {asset.name: _spread(asset.drawn, _lowest(found)) for asset, found in zip(documents, heights, strict=True)}
-    grid = bases_grid([asset for asset in documents if len(asset.boxes)], kept)
-    between = {asset.name: _between(asset, grid) for asset in documents}
-    return Ground(terrain, between, surfaces, grid)
+    bases = [bases_of(asset, kept[asset.name]) for asset in documents if len(asset.boxes)]
+    grid = GroundGrid.of_bases(np.concatenate(bases)) if bases else None
+    return Ground(terrain, surfaces, grid)
 
 
 def terrain_surfaces(assets: Sequence[SurveyedAsset], kept: Mapping[str, Flags], *, is_adjusted: bool) -> list[_core.Surface]:
@@ -56,16 +56,11 @@ def terrain_surfaces(assets: Sequence[SurveyedAsset], kept: Mapping[str, Flags],
     return found
 
 
-def bases_grid(assets: Sequence[SurveyedAsset], kept: Mapping[str, Flags]) -> GroundGrid | None:
-    """Returns the ground between the bases of the objects that stand on it, or None."""
-    bases = [bases_of(asset, kept[asset.name]) for asset in assets]
-    return GroundGrid.of_bases(np.concatenate(bases)) if bases else None
-
-
-def bases_of(asset: SurveyedAsset, kept: Flags) -> Floats:
-    """Returns (n, 3) the middle of the lower face of the box of each object that stands on the ground."""
-    boxes = asset.boxes[kept & asset.drawn & np.isin(asset.classes, STANDING)]
-    return np.column_stack([(boxes[:, 0, :2] + boxes[:, 1, :2]) / 2, boxes[:, 0, 2]])
+def bases_of(asset: SurveyedAsset, kept: Flags, heights: Floats | None = None) -> Floats:
+    """Returns (n, 3) the middle of the lower face of the box of each object that stands on the ground. `heights`: (wholes,), else as imported."""
+    chosen = kept & asset.drawn & np.isin(asset.classes, STANDING)
+    boxes = asset.boxes[chosen]
+    return np.column_stack([(boxes[:, 0, :2] + boxes[:, 1, :2]) / 2, boxes[:, 0, 2] if heights is None else heights[chosen]])
 
 
 def _between(asset: SurveyedAsset, grid: GroundGrid | None) -> Floats:

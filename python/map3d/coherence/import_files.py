@@ -6,7 +6,8 @@ from pathlib import Path
 
 from map3d.catalogue import AssetRecord, Catalogue, Workspace
 from map3d.catalogue.scene_lock import scene_lock
-from map3d.coherence.check import check_scene, choose_heights
+from map3d.coherence.check import check_scene, choose_file_heights
+from map3d.coherence.height_rules import with_choice
 from map3d.coherence.photo_ground import ground_change, photo_ground
 from map3d.coherence.plan import plan_import
 from map3d.errors import BadRequest, Map3dError, UnknownFormat
@@ -55,8 +56,7 @@ def import_files(
     Raises NotFound, UnknownFormat, BadRequest; ImportFailed and LimitExceeded for an archive that cannot be unpacked; under `options.strict` and for
     a single file also the errors of `import_file`.
     """
-    catalogue.scene(scene)
-    choose_heights(catalogue, scene, options.heights, options.clamp)
+    with_choice(catalogue.scene(scene).options, options.heights, options.clamp)
     with unpacked(workspace, scene, files, progress or (lambda *_: None)) as found:
         virtual = [path for path in files if options.virtual_rasters and path in found.paths]
         done = _import_files(workspace, catalogue, scene, found, virtual, options, progress)
@@ -98,6 +98,7 @@ def _import_files(
     known = _known_assets(workspace, catalogue, scene) if options.skip_unchanged else {}
     grids = ReliefGrids()
     plan = plan_import(sources, options, catalogue.scene(scene))
+    choose_file_heights(catalogue, scene, [source.name for source in sources], options.heights, options.clamp)
     waiting, number = list(plan.sources), 0
     with ParserProcess() as parser:
         while waiting or grids.is_waiting:

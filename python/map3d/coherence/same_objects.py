@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -153,7 +152,7 @@ def _findings(wholes: Wholes, number: int, own: NDArray[np.int64]) -> list[dict[
     for owner in np.unique(owners).tolist():
         there = left[owners == owner]
         other = wholes.assets[owner]
-        file = _label(asset, other)
+        file = asset.label_of(other)
         is_equal = asset.contents[there] == wholes.contents[own[there]]
         if len(there) == len(own) and is_equal.all():
             found.append(finding("file-is-copy", len(there), "", file=file))
@@ -163,12 +162,3 @@ def _findings(wholes: Wholes, number: int, own: NDArray[np.int64]) -> list[dict[
             if chosen.any():
                 found.append(finding(code, int(chosen.sum()), ", ".join(asset.names_of(there[chosen], 3)), file=file))
     return found
-
-
-def _label(asset: SurveyedAsset, other: SurveyedAsset) -> str:
-    """Returns the name of the other's file, with as many of its folders as tell the two apart."""
-    one, two = Path(asset.record.source).parts, Path(other.record.source).parts
-    depth = 1
-    while one[-depth:] == two[-depth:] and depth < min(len(one), len(two)):
-        depth += 1
-    return "/".join(two[-depth:])

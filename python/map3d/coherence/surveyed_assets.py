@@ -133,6 +133,14 @@ class SurveyedAsset:
         """Returns values of wholes for each object."""
         return values[self.roots]
 
+    def label_of(self, other: "SurveyedAsset") -> str:
+        """Returns the name of another asset's file, with as many of its folders as tell it from this one's."""
+        one, two = Path(self.record.source).parts, Path(other.record.source).parts
+        depth = 1
+        while one[-depth:] == two[-depth:] and depth < min(len(one), len(two)):
+            depth += 1
+        return "/".join(two[-depth:])
+
     def names_of(self, wholes: NDArray[np.int64], limit: int) -> list[str]:
         """Returns the names of the first of some wholes."""
         wanted = [int(self.firsts[number]) for number in wholes[:limit]]

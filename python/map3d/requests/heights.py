@@ -17,11 +17,11 @@ class HeightChoice:
 
     heights: str | None = param(
         None,
-        help="Heights of files that contradict the terrain: as-is leaves them, clamp sets their objects on it, a number of metres "
+        help="Heights of files that contradict the terrain or each other: as-is leaves them, clamp sets their objects on it, a number of metres "
         "moves them, and auto sets only objects on it that have no heights by their standard.",
         words="as before, first auto",
         metavar="auto|as-is|clamp|METRES",
-        label="Heights of files that contradict the terrain",
+        label="Heights of files that contradict the terrain or each other",
     )
     clamp: tuple[str, ...] = param(
         (),

@@ -32,8 +32,7 @@ OPTIONS: Final[Mapping[str, Any]] = {
     "drop_untextured": False,
     "ground_plane": "auto",
 }
-_CHECKED: Final = (check.HEIGHTS, check.CLAMP)
-_NOT_OF_BUILDS: Final = (FILES, HEIGHTS_DIFFER, *_CHECKED)
+_NOT_OF_BUILDS: Final = (FILES, HEIGHTS_DIFFER, *check.OPTIONS)
 """Options of scenes on which a build does not depend, or by way of the check of coherence alone."""
 GROUND: Final = "ground"
 BUILD_BYTES: Final = 2 << 30
@@ -111,7 +110,7 @@ def build_if_stale(
 def scene_digest(catalogue: Catalogue, record: SceneRecord) -> str:
     """Returns a digest of everything that a build depends on."""
     assets = [(asset.name, asset.digest) for asset in catalogue.assets(record.name)]
-    checked = [check.VERSION, *(record.options.get(name) for name in _CHECKED)]
+    checked = [check.VERSION, *(record.options.get(name) for name in check.OPTIONS)]
     text = json.dumps([assets, record.origin, _build_options(record), _core.__version__, _core.SCENE_VERSIONS, checked], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from map3d.catalogue import AssetRecord, Catalogue, SceneRecord, Workspace
 from map3d.catalogue.scene_lock import scene_lock
-from map3d.coherence.check import NO_CLASSES, check_scene, choose_heights
+from map3d.coherence.check import check_scene, choose_heights
+from map3d.coherence.height_rules import NO_CLASSES
 from map3d.coherence.photo_ground import ground_change, photo_ground
 from map3d.coherence.plan import ImportPlan, plan_import
 from map3d.errors import BadRequest, Map3dError, UnknownFormat

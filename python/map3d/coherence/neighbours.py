@@ -1,0 +1,226 @@
+"""Compares the bases of objects with those of the files beside them, which lie between theirs or along a common border (docs/odd-files.md, Height).
+
+Bases are compared in cells: the median of one file with those of other files in the same cell and the eight around it. Files whose bases agree are a
+*level*; of the levels that touch each other, the one with the most objects is right, unless what explains the distance says otherwise.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from map3d.coherence.height_kinds import DEVIATIONS, GROUND_KINDS, TOLERANCE_M, are_zero, find_kind, robust_middle
+from map3d.coherence.surveyed_assets import Floats
+
+CELL_M: Final = 50.0
+STEEPEST: Final = 0.5
+"""Rise of the ground, in metres per metre, that explains the distance between the bases of two cells."""
+LEAST_OBJECTS: Final = 3
+"""Least number of objects of each of two files in cells that are compared."""
+SAME_LEVEL: Final = 0.1
+"""Part of the distance between two files by which others may differ that are as far from them."""
+
+Numbers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class FileBases:
+    """What stands in one file. `bases`: (n, 3) world coordinates; `is_right`: whether they fit the terrain; `is_guessed`: as in `find_kind`."""
+
+    bases: Floats
+    is_right: bool
+    is_guessed: bool
+
+
+@dataclass(frozen=True)
+class FileDifference:
+    """A file that contradicts the file beside it, both as numbers. `kind`: as in `find_kind`; `metres`: from the bases beside it to its own."""
+
+    file: int
+    beside: int
+    kind: str
+    metres: float
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """Heights of two files in cells that touch: (n,) each; `apart_m` from the middle of one to that of the other."""
+
+    one: Floats
+    other: Floats
+    apart_m: Floats
+
+    @cached_property
+    def metres(self) -> float:
+        """From the bases of the other file to those of the one."""
+        return robust_middle(self.one - self.other)[0]
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the distance is more than a slope explains."""
+        metres, deviation = robust_middle(self.one - self.other)
+        return abs(metres) > max(TOLERANCE_M + STEEPEST * float(np.median(self.apart_m)), DEVIATIONS * deviation)
+
+    @property
+    def turned(self) -> "_Pair":
+        return _Pair(self.other, self.one, self.apart_m)
+
+
+def compare_files(files: Sequence[FileBases], geoid_m: float | None) -> list[FileDifference]:
+    """Returns the files that contradict those beside them, in their order. `geoid_m`: as in `find_kind`."""
+    pairs = dict(_pairs(files))
+    if not any(pair.contradicts for pair in pairs.values()):
+        return []
+    levels = _levels(len(files), pairs)
+    found: list[FileDifference] = []
+    for group in _touching(levels, pairs):
+        found += _of_group(files, pairs, group, geoid_m)
+    return sorted(found, key=lambda difference: difference.file)
+
+
+def _of_group(
+    files: Sequence[FileBases], pairs: Mapping[tuple[int, int], _Pair], offsets: Mapping[int, float], geoid_m: float | None
+) -> Iterator[FileDifference]:
+    """Judges files that touch each other. `offsets`: file → metres from the first of them."""
+    right_m = _right_level(files, offsets)
+    wrong = [number for number, metres in offsets.items() if not _is_same(metres, right_m)]
+    right = [number for number in offsets if number not in wrong]
+    of_wrong = {number: _kind(files, pairs, number, right, geoid_m) for number in wrong}
+    known = {kind for kind in of_wrong.values() if kind is not None}
+    if known and known <= set(GROUND_KINDS) and not any(files[number].is_right for number in right):
+        wrong, right = right, wrong
+        of_wrong = {number: _kind(files, pairs, number, right, geoid_m) for number in wrong}
+        right_m = float(np.median([offsets[number] for number in right]))
+        known = {kind for kind in of_wrong.values() if kind is not None}
+    for number in wrong:
+        metres = offsets[number] - right_m
+        kind = of_wrong[number] or min(known, default="heights-below-terrain" if metres < 0 else "heights-above-terrain")
+        yield FileDifference(number, _beside(pairs, number, right), kind, metres)
+
+
+def _right_level(files: Sequence[FileBases], offsets: Mapping[int, float]) -> float:
+    """Returns the offset of the files that fit the terrain, else of those with the most objects."""
+    weights = {number: (any(files[one].is_right for one in same), sum(len(files[one].bases) for one in same)) for number, same in _same(offsets)}
+    return offsets[max(weights, key=lambda number: (*weights[number], -number))]
+
+
+def _same(offsets: Mapping[int, float]) -> Iterator[tuple[int, list[int]]]:
+    for number, metres in offsets.items():
+        yield number, [other for other, away in offsets.items() if _is_same(away, metres)]
+
+
+def _is_same(one_m: float, other_m: float) -> bool:
+    return abs(one_m - other_m) <= max(TOLERANCE_M, SAME_LEVEL * max(abs(one_m), abs(other_m)))
+
+
+def _kind(files: Sequence[FileBases], pairs: Mapping[tuple[int, int], _Pair], number: int, right: Sequence[int], geoid_m: float | None) -> str | None:
+    """Returns what explains the distance of a file from the right ones that it touches; None if it touches none."""
+    touched = [pair for other in right if (pair := _pair(pairs, number, other)) is not None]
+    if not touched:
+        return None
+    base, ground = (np.concatenate(values) for values in zip(*((pair.one, pair.other) for pair in touched), strict=True))
+    if are_zero(ground) and not are_zero(base):
+        return GROUND_KINDS[0]
+    return find_kind(base, ground, is_guessed=files[number].is_guessed, geoid_m=geoid_m)
+
+
+def _beside(pairs: Mapping[tuple[int, int], _Pair], number: int, right: Sequence[int]) -> int:
+    """Returns the right file that a file touches in most cells, the first one if it touches none."""
+    touched = {other: len(pair.one) for other in right if (pair := _pair(pairs, number, other)) is not None}
+    return max(touched, key=lambda other: (touched[other], -other), default=right[0])
+
+
+def _pair(pairs: Mapping[tuple[int, int], _Pair], one: int, other: int) -> _Pair | None:
+    if (one, other) in pairs:
+        return pairs[one, other]
+    return pairs[other, one].turned if (other, one) in pairs else None
+
+
+def _levels(count: int, pairs: Mapping[tuple[int, int], _Pair]) -> list[int]:
+    """Returns for each file the first one of its level."""
+    firsts = list(range(count))
+    for (one, other), pair in pairs.items():
+        if not pair.contradicts and firsts[one] != firsts[other]:
+            kept, gone = sorted((firsts[one], firsts[other]))
+            firsts = [kept if first == gone else first for first in firsts]
+    return firsts
+
+
+def _touching(levels: Sequence[int], pairs: Mapping[tuple[int, int], _Pair]) -> Iterator[dict[int, float]]:
+    """Yields groups of several levels that touch: file → metres from the first level of the group."""
+    steps: dict[int, dict[int, list[float]]] = {}
+    for (one, other), pair in pairs.items():
+        if levels[one] != levels[other]:
+            steps.setdefault(levels[other], {}).setdefault(levels[one], []).append(pair.metres)
+            steps.setdefault(levels[one], {}).setdefault(levels[other], []).append(-pair.metres)
+    placed: set[int] = set()
+    for start in sorted(steps):
+        if start in placed:
+            continue
+        offsets, waiting = {start: 0.0}, [start]
+        while waiting:
+            level = waiting.pop(0)
+            for other, metres in sorted(steps[level].items()):
+                if other not in offsets:
+                    offsets[other] = offsets[level] + float(np.median(metres))
+                    waiting.append(other)
+        placed |= set(offsets)
+        yield {number: offsets[level] for number, level in enumerate(levels) if level in offsets}
+
+
+def _pairs(files: Sequence[FileBases]) -> Iterator[tuple[tuple[int, int], _Pair]]:
+    """Yields what several objects of two files tell, for each two files that touch."""
+    cells = _Cells(files)
+    if len(np.unique(cells.owners)) < 2:
+        return
+    one, other = cells.touching()
+    if not len(one):
+        return
+    order = np.lexsort((cells.owners[other], cells.owners[one]))
+    one, other = one[order], other[order]
+    both = np.column_stack([cells.owners[one], cells.owners[other]])
+    starts = np.flatnonzero(np.any(np.diff(both, axis=0, prepend=-1) != 0, axis=1))
+    for start, end in zip(starts, [*starts[1:], len(one)], strict=True):
+        own, beside = one[start:end], other[start:end]
+        if min(cells.counts[np.unique(own)].sum(), cells.counts[np.unique(beside)].sum()) >= LEAST_OBJECTS:
+            apart_m = np.hypot(*(cells.middles[own] - cells.middles[beside]).T)
+            yield (int(both[start, 0]), int(both[start, 1])), _Pair(cells.heights[own], cells.heights[beside], apart_m)
+
+
+class _Cells:
+    """The cells of each file: (n,) arrays, in the order of `keys`, which number places."""
+
+    def __init__(self, files: Sequence[FileBases]) -> None:
+        bases = np.concatenate([file.bases for file in files]) if files else np.empty((0, 3))
+        owners = np.repeat(np.arange(len(files)), [len(file.bases) for file in files])
+        keys = _key(np.floor(bases[:, :2] / CELL_M).astype(np.int64))
+        order = np.lexsort((bases[:, 2], owners, keys))
+        bases, owners, keys = bases[order], owners[order], keys[order]
+        is_first = np.ones(len(keys), dtype=bool)
+        is_first[1:] = (keys[1:] != keys[:-1]) | (owners[1:] != owners[:-1])
+        starts = np.flatnonzero(is_first)
+        self.counts: Numbers = np.diff(np.append(starts, len(keys)))
+        self.keys: Numbers = keys[starts]
+        self.owners: Numbers = owners[starts]
+        self.heights: Floats = bases[starts + (self.counts - 1) // 2, 2]
+        self.middles: Floats = np.add.reduceat(bases[:, :2], starts, axis=0) / self.counts[:, None] if len(starts) else np.empty((0, 2))
+
+    def touching(self) -> tuple[Numbers, Numbers]:
+        """Returns pairs of cells of different files that are one place or lie beside each other, each pair once."""
+        ones, others = [], []
+        for shift in (_key(np.array([dx, dy])) for dx in (-1, 0, 1) for dy in (-1, 0, 1)):
+            first, end = (np.searchsorted(self.keys, self.keys + shift, side=side) for side in ("left", "right"))
+            one = np.repeat(np.arange(len(self.keys)), end - first)
+            other = np.arange(len(one)) - np.repeat(np.cumsum(end - first) - (end - first), end - first) + np.repeat(first, end - first)
+            is_pair = self.owners[one] < self.owners[other]
+            ones.append(one[is_pair])
+            others.append(other[is_pair])
+        return np.concatenate(ones), np.concatenate(others)
+
+
+def _key(cells: Numbers) -> Numbers:
+    keys: Numbers = cells[..., 0] * (1 << 32) + cells[..., 1]
+    return keys
