@@ -121,6 +121,15 @@ def test_added_layers_are_a_new_pass_and_keep_jobs(catalogue: Catalogue) -> None
         catalogue.add_pass("other", added)
 
 
+def test_described_rendering_keeps_all_else(catalogue: Catalogue) -> None:
+    before = catalogue.rendering("town-a")
+    after = catalogue.describe_rendering("town-a", "Harbour", "Port", {"description": "old"})
+    assert after == catalogue.rendering("town-a")
+    assert after == dataclasses.replace(before, title="Harbour", attribution="Port", options={"description": "old"})
+    with pytest.raises(NotFound):
+        catalogue.describe_rendering("other", "", "", {})
+
+
 def test_removed_asset_is_gone(catalogue: Catalogue) -> None:
     for name in ("x", "y"):
         catalogue.put_asset(AssetRecord("town", name, "", "obj", "", ""))

@@ -39,7 +39,7 @@ def properties(*names: str) -> dict[str, Any]:
 
 
 NEW_SCENE = properties("NewScene") | properties("NewScene")["options"]["properties"]
-EXACT = {"sun", "place", "window", "offset"}
+EXACT = {"sun", "place", "window", "offset", "start_view"}
 """Lists of as many numbers as the value has."""
 IMPORT = ARGUMENTS["import"]["properties"]["options"]["properties"]
 VERBS = [
@@ -48,6 +48,7 @@ VERBS = [
     Verb(requests.Inspect, "inspect"),
     Verb(requests.Build, None, properties("BuildArguments"), LibraryScene.build),
     Verb(requests.CreateRendering, "create-rendering", properties("NewRendering"), LibraryScene.create_rendering, BuildAndCreateRendering),
+    Verb(requests.ChangeRendering, "change-rendering", properties("RenderingChange"), LibraryRendering.change),
     Verb(requests.AddViews, "add-views"),
     Verb(requests.AddLayers, "add-layers"),
     Verb(requests.Estimate, "estimate", None, LibraryRendering.estimate),

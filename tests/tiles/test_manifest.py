@@ -154,9 +154,12 @@ def test_data_tiles_are_the_format_of_the_data_layer_alone(manifest, kind, forma
 def test_the_schema_lists_every_member(manifest, added):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
     shown = tuple(replace(view, thumbnail=THUMBNAIL) for view in added.views)
-    value = replace(added, geographic=GEOGRAPHIC, views=shown).with_archives(archives, 7, 1 << 20).to_json()
+    described = replace(added, geographic=GEOGRAPHIC, views=shown, description="Tea", start_view="45-22.5")
+    value = described.with_archives(archives, 7, 1 << 20).to_json()
     schema = SCHEMA["properties"]
-    assert set(schema) == set(value) == {*SCHEMA["required"], "geographic", "archive_part_bytes"}
+    assert set(schema) == set(value) == {*SCHEMA["required"], "geographic", "archive_part_bytes", "description"}
+    assert set(schema["start"]["properties"]) == set(value["start"])
+    assert Manifest.load(json.dumps(value)).to_json() == value
     assert set(schema["views"]["items"]["properties"]) == set(value["views"][0])
     assert set(schema["layers"]["items"]["properties"]) == set().union(*value["layers"])
     assert set(schema["crs"]["properties"]) == set(value["crs"])

@@ -1,5 +1,6 @@
 """The REST API: its OpenAPI document is valid and complete, and every answer and every error is as it says."""
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -86,7 +87,7 @@ def test_document_is_valid_and_has_every_route(api: Api) -> None:
     listed = {(method.upper(), path) for path, methods in api.document["paths"].items() for method in methods}
     rules = {(rule.method, rule.path.removeprefix(ROOT)) for rule in api.client.app.views.rules if rule.path.startswith(ROOT)}
     assert listed == rules
-    assert len(listed) == 18
+    assert len(listed) == 19
     assert api.document["servers"] == [{"url": "http://test/api/v1"}]
 
 
@@ -165,6 +166,17 @@ def test_renderings_are_public_and_described(api: Api) -> None:
     assert (listed[0]["views"], listed[0]["levels"], listed[0]["res_m"]) == (["0-45", "45-22.5"], 5, 0.1)
     assert api.get("/renderings?scene=nothing")["renderings"] == []
     assert api.get("/renderings/nothing", 404, token=None)["detail"] == "not found", "visitors do not learn what exists"
+
+
+def test_texts_and_start_view_of_a_rendering_change(api: Api) -> None:
+    change = {"title": "Harbour", "start_view": [45, 22.5]}
+    found = api.send("PATCH", "/renderings/tea", 200, json=change).json()
+    assert (found["title"], found["attribution"], found["start_view"]) == ("Harbour", "© City of Tea", "45-22.5")
+    assert api.get("/renderings/tea") == found
+    assert json.loads(api.workspace.manifest_path("tea").read_text())["start"]["view"] == "45-22.5"
+    for wrong in ({}, {"start_view": [10, 10]}, {"title": 3}, {"name": "x"}):
+        assert api.send("PATCH", "/renderings/tea", 400, json=wrong)
+    assert api.send("PATCH", "/renderings/none", 404, json=change)
 
 
 def test_jobs_are_counted_and_failures_have_reasons(api: Api) -> None:

@@ -309,6 +309,13 @@ def test_rendering_from_the_form_to_the_map_and_away(town):
         shown = town.get(urljoin(path, re.search('src="([^"]*)"', picture)[1]))
         assert (shown.status_code, shown.headers["content-type"]) == (200, "image/jpeg")
 
+    texts = {"title": "Old harbour", "attribution": "", "description": "Ships", "start_view": "0 60"}
+    assert town.post("/studio/renderings/my-map/change", **texts).status_code == 303
+    found = town.get("/view/my-map/rendering.json").json()
+    assert (found["title"], found["description"], found["start"]["view"], found["complete"]) == ("Old harbour", "Ships", "0-60", True)
+    assert 'value="Old harbour"' in town.get("/studio/renderings/my-map").text
+    assert town.post("/studio/renderings/my-map/change", start_view="17 60").status_code == 400
+
     confirmation = "/studio/scenes/town/files/b/remove"
     link = re.search('href="([^"]*)"[^>]*aria-label="Remove b"', town.get("/studio/scenes/town").text)[1]
     assert urljoin("/studio/scenes/town", link) == confirmation
@@ -332,7 +339,7 @@ def test_rendering_from_the_form_to_the_map_and_away(town):
     (other / "rendering.json").write_text('{"map3d": "rendering", "name": "harbour", "origin": [0, 0, 0]}')
     refused = town.post("/studio/renderings/my-map/publish", folder="other")
     assert (refused.status_code, "another rendering, harbour" in refused.text, "--replace" in refused.text) == (400, True, False)
-    town.post("/studio/renderings/my-map/publish", folder="other", replace="on")
+    town.post("/studio/renderings/my-map/publish", folder="other", replace="yes")
     town.work()
     assert json.loads((other / "rendering.json").read_text())["name"] == "my-map"
     shutil.rmtree(other)

@@ -82,6 +82,9 @@ class Catalogue(OperationCatalogue, Protocol):
         """Adds layers to a rendering as a new pass and returns the stored record; its jobs stay. Raises NotFound, AlreadyExists for an existing
         name."""
 
+    def describe_rendering(self, name: str, title: str, attribution: str, options: Mapping[str, Any]) -> RenderingRecord:
+        """Replaces title, attribution and options of a rendering and returns the stored record. Raises NotFound."""
+
     def announce(self, name: str, version: int) -> None:
         """Records that clients may have seen a manifest with this content version."""
 

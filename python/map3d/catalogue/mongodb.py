@@ -164,6 +164,11 @@ class MongoCatalogue(MongoOperations, MongoAccounts):
 
         return self._change(name, "passes", change)
 
+    def describe_rendering(self, name: str, title: str, attribution: str, options: Mapping[str, Any]) -> RenderingRecord:
+        after = _dump(replace(self.rendering(name), title=title, attribution=attribution, options=options))
+        self._update_many({"_id": name}, {"$set": {field: after[field] for field in ("title", "attribution", "options")}}, "rendering")
+        return self.rendering(name)
+
     def announce(self, name: str, version: int) -> None:
         self._update_many({"_id": name}, {"$max": {"announced_version": version}}, "rendering")
 

@@ -14,6 +14,9 @@ from map3d.types import BlockId, BlockKind, Box, Layer, Vec3
 
 LOCAL_CRS_NAME = "local metres"
 WINDOW = "window"
+DESCRIPTION: Final = "description"
+START_VIEW: Final = "start_view"
+"""Keys in `RenderingRecord.options`: what the map says of itself, and the id of the view in which it opens."""
 HEIGHTS_DIFFER: Final = "heights_differ"
 """Key in `SceneRecord.options` of scenes whose files do not share the height system of the scene."""
 FENCES_PER_VERSION: Final = 1 << 20
@@ -157,6 +160,16 @@ class RenderingRecord:
     def window(self) -> Window | None:
         """Returns the window that the frames were pinned to instead of all of `box`; it is stored in `options`."""
         return Window(**self.options[WINDOW]) if WINDOW in self.options else None
+
+    @property
+    def description(self) -> str:
+        return str(self.options.get(DESCRIPTION, ""))
+
+    @property
+    def start_view(self) -> str | None:
+        """Returns the id of the view in which the map opens; None for the first one. A view that the rendering has no more does not count."""
+        found = self.options.get(START_VIEW)
+        return found if found is not None and self.frame(found) is not None else None
 
     def frame(self, view: str) -> PinnedFrame | None:
         return next((frame for frame in self.frames if frame.id == view), None)

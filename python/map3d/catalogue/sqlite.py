@@ -182,6 +182,13 @@ class SqliteCatalogue(SqliteOperations, SqliteAccounts):
             db.execute("UPDATE rendering SET passes = ? WHERE name = ?", (codec.dump_passes(after.passes), name))
             return after
 
+    def describe_rendering(self, name: str, title: str, attribution: str, options: Mapping[str, Any]) -> RenderingRecord:
+        with self._database.transaction() as db:
+            _rendering(db, name)
+            values = (title, attribution, json.dumps(dict(options)), name)
+            db.execute("UPDATE rendering SET title = ?, attribution = ?, options = ? WHERE name = ?", values)
+            return _rendering(db, name)
+
     def announce(self, name: str, version: int) -> None:
         with self._database.transaction() as db:
             db.execute("UPDATE rendering SET announced_version = max(announced_version, ?) WHERE name = ?", (version, name))

@@ -18,6 +18,7 @@ COMMANDS: Final = {
     "inspect": "inspect",
     "add-files": "add_files",
     "create-rendering": "create_rendering",
+    "change-rendering": "change_rendering",
     "add-views": "add_to_rendering:add_views",
     "add-layers": "add_to_rendering:add_layers",
     "estimate": "estimate",

@@ -10,6 +10,7 @@ import click
 from map3d.catalogue import Workspace
 from map3d.cli.app import run
 from map3d.cli.from_request import request_option
+from map3d.errors import BadRequest
 from map3d.requests import Site
 from map3d.types import DEFAULT_DATA, LAYERS_BY_DATA, DataEncoding
 
@@ -31,7 +32,7 @@ SCENE: Final = "town"
 @click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="a free port", help="Port to listen on.")
 @click.option("--no-serve", is_flag=True, help="Stop after rendering.")
 @request_option(Site, "data")
-def command(folder: Path, port: int, no_serve: bool, data: DataEncoding) -> None:
+def command(folder: Path, port: int, no_serve: bool, data: DataEncoding | None) -> None:
     """Generate a town, render it, serve it and print the address of its map.
 
     You can stop it at any time; re-run it to resume.
@@ -45,19 +46,21 @@ def command(folder: Path, port: int, no_serve: bool, data: DataEncoding) -> None
         _run("serving the map; press Ctrl-C to stop", ["serve", NAME, "--port", str(port), "--workspace", str(workspace.root)])
 
 
-def remaining_steps(workspace: Workspace, files: Path, data: DataEncoding = DEFAULT_DATA) -> Iterator[tuple[str, list[str]]]:
+def remaining_steps(workspace: Workspace, files: Path, data: DataEncoding | None = None) -> Iterator[tuple[str, list[str]]]:
     """Yields (description, command line) of each step up to rendering, without the steps that an earlier run has completed."""
     where = ["--workspace", str(workspace.root)]
     yield f"generating a town in {files}", ["make-town", "-o", str(files), *TOWN]
     with workspace.open_catalogue() as catalogue:
         assets = {scene.name: catalogue.assets(scene.name) for scene in catalogue.scenes()}
-        renderings = {rendering.name for rendering in catalogue.renderings()}
+        renderings = {rendering.name: {layer.kind for layer in rendering.layers} for rendering in catalogue.renderings()}
+    if data is not None and NAME in renderings and not renderings[NAME] >= set(LAYERS_BY_DATA[data]):
+        raise BadRequest(f"the demo in {files.parent} was rendered with other data than --data {data}; name another --folder, or remove this one")
     if SCENE not in assets:
         yield "creating a scene", ["create-scene", SCENE, *TITLE, *where]
     if not assets.get(SCENE):
         yield "importing the town's files", ["add-files", SCENE, str(files), *where]
     if NAME not in renderings:
-        layers = ["--layers", ",".join((*LAYERS_BY_DATA[data], *LIGHT))]
+        layers = ["--layers", ",".join((*LAYERS_BY_DATA[data or DEFAULT_DATA], *LIGHT))]
         yield "building the scene and creating a rendering", ["create-rendering", SCENE, NAME, "--res", RES_M, *OPTIONS, *layers, *TITLE, *where]
     yield "rendering the tiles", ["render", NAME, *where]
 

@@ -51,8 +51,7 @@ def command(workspace: Workspace, request: Site) -> None:
     out, workers, memory = request.out, request.processes, request.max_memory_bytes
     settings = RunSettings(workers, memory)
     settings.check()
-    folder_name = request.folder.resolve().stem
-    request = replace(request, name=request.name or asset_name(folder_name), title=request.title or folder_name)
+    request = replace(request, name=request.name or asset_name(request.folder.resolve().stem))
     viewer_folder()
     check_folder(out, MapIdentity(request.name), request.replace)
     with workspace.create().open_catalogue() as catalogue:

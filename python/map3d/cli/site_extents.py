@@ -35,8 +35,14 @@ def print_rendering(made: SiteRendering) -> None:
     )
     if made.has_chosen_ao:
         click.echo("ambient occlusion is rendered, since textures cover less than a tenth of the surfaces; --no-ao leaves it out")
-    if made.refitted:
+    if made.changes is None:
+        return
+    if made.changes.outgrown:
         click.echo("the content has outgrown the frames of the views, so that everything is rendered again")
+    if made.changes.again:
+        click.echo(f"everything is rendered again, since what is rendered does not fit {', '.join(made.changes.again)}")
+    if made.changes.added:
+        click.echo(f"added {', '.join(made.changes.added)}")
 
 
 def print_estimate(workspace: Workspace, catalogue: Catalogue, rendering: str, workers: int) -> None:

@@ -14,11 +14,12 @@ from map3d.jobs.run import Run, RunResult
 from map3d.jobs.run_counter import RunCounter
 from map3d.jobs.run_settings import RunSettings
 from map3d.library.on_progress import OnProgress, building, publishing
+from map3d.lifecycle.change_rendering import change_rendering
 from map3d.lifecycle.create_rendering import add_layers, add_views
 from map3d.lifecycle.remove_rendering import find_rendering, remove_rendering
 from map3d.publish import Published, publish
 from map3d.renderings.cost_estimate import RenderingEstimate, estimate
-from map3d.requests import AddLayers
+from map3d.requests import AddLayers, ChangeRendering
 from map3d.scenes.build import build_if_stale
 from map3d.types import ViewAngles
 
@@ -72,6 +73,19 @@ class LibraryRendering:
     def progress(self) -> ProgressReport:
         """Returns the number of blocks in every state, workers, failures with their reasons, rate and time left."""
         return report_progress(self._catalogue, self.name)
+
+    def change(
+        self,
+        *,
+        title: str | None = None,
+        attribution: str | None = None,
+        description: str | None = None,
+        start_view: tuple[float, float] | None = None,
+    ) -> None:
+        """Changes what the map says and how it opens; None leaves it as it is. `start_view`: look-at angle and pitch. Raises BadRequest."""
+        view = None if start_view is None else ViewAngles(*start_view)
+        request = ChangeRendering(title=title, attribution=attribution, description=description, start_view=view)
+        change_rendering(self._workspace, self._catalogue, self.name, request)
 
     def add_views(self, *views: tuple[float, float]) -> None:
         """Adds views, as (look-at angle, pitch); `render` renders them. Raises BadRequest, OutsideFrame."""

@@ -57,6 +57,8 @@ def describe_page(page: str, manifest: Manifest, picture: str | None, url: str |
 
 
 def _description(manifest: Manifest) -> str:
+    if manifest.description:
+        return manifest.description
     count = len(manifest.views)
     return f"Oblique map in {count} {'view' if count == 1 else 'views'}. {manifest.attribution}".strip()
 

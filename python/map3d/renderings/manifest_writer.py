@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from map3d.catalogue import Catalogue, JobResult, RenderingRecord, SceneRecord, State, Track, Workspace
@@ -16,7 +17,7 @@ from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView, Thumbnail
 from map3d.tiles.naming import block_levels
 from map3d.tiles.occupancy import Occupancy
 from map3d.tiles.tile_store import TileStore
-from map3d.tiles.track_stores import find_track, share_manifest
+from map3d.tiles.track_stores import find_track, read_manifest, share_manifest
 from map3d.types import BlockId, Box, Vec3
 
 Planned = Mapping[str, Occupancy]
@@ -53,7 +54,26 @@ def current_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderi
         objects=objects,
         start=_start(record, box),
         geographic=geographic_of(scene, box),
+        description=record.description,
+        start_view=record.start_view,
     )
+
+
+def describe_manifest(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord) -> None:
+    """Writes the texts and the start view of a rendering to its manifest, if it has one. Its tiles and versions stay."""
+    data = read_manifest(workspace, record)
+    if data is None:
+        return
+    scene, where = catalogue.scene(record.scene), workspace.manifest_path(record.name)
+    manifest = replace(
+        Manifest.load(data, str(where)),
+        title=record.title or scene.title,
+        attribution=record.attribution or scene.attribution,
+        description=record.description,
+        start_view=record.start_view,
+    )
+    _write(where, manifest.dump())
+    share_manifest(record, manifest.dump())
 
 
 def _start(record: RenderingRecord, box: Box) -> Vec3 | None:

@@ -4,7 +4,7 @@ keywords and fields are views of it, and tests/requests compares them."""
 from map3d.requests.publications import Export, Publish
 from map3d.requests.reading import AddFiles, Inspect
 from map3d.requests.removals import RemoveFiles, RemovePublished, RemoveRendering, RemoveScene
-from map3d.requests.renderings import AddLayers, AddViews, CreateRendering, Estimate, LayerDetails, Render
+from map3d.requests.renderings import AddLayers, AddViews, ChangeRendering, CreateRendering, Estimate, LayerDetails, Render
 from map3d.requests.scenes import Build, CreateScene
 from map3d.requests.site import Site
 
@@ -13,6 +13,7 @@ __all__ = [
     "AddLayers",
     "AddViews",
     "Build",
+    "ChangeRendering",
     "CreateRendering",
     "CreateScene",
     "Estimate",

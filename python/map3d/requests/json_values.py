@@ -46,6 +46,7 @@ _KINDS: Final[Mapping[Any, _Kind]] = {
     tuple[str, ...]: _Kind(_texts({"type": "string"}), tuple),
     tuple[float, ...]: _Kind({"anyOf": [_NUMBER, _texts(_NUMBER)]}, lambda value: tuple(value) if isinstance(value, list) else (float(value),)),
     tuple[ViewAngles, ...]: _Kind(_texts(_numbers(2)), lambda value: tuple(ViewAngles(*view) for view in value)),
+    ViewAngles: _Kind(_numbers(2), lambda value: ViewAngles(*value)),
     Style: _Kind(
         {
             "type": "object",

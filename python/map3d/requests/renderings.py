@@ -41,12 +41,13 @@ def data_param(*default: Any, before: str = "", words: str = "") -> Any:
     return param(*default, help=about, words=words, choices=choices, label="Surface directions, objects and depth as")
 
 
-def small_param() -> Any:
-    return param(False, help="Encode for size: about 30 % fewer bytes, in three times the encoding time.", label="Encode for size")
+def small_param(default: bool | None = False, **more: Any) -> Any:
+    return param(default, help="Encode for size: about 30 % fewer bytes, in three times the encoding time.", label="Encode for size", **more)
 
 
-def color_param(layers: str) -> Any:
-    return param(COLOR_FORMATS[0], help=f"Image format of the {layers}.", choices=COLOR_FORMATS, label="Image format of colours")
+def color_param(layers: str, default: str | None = COLOR_FORMATS[0]) -> Any:
+    words = "" if default else COLOR_FORMATS[0]
+    return param(default, help=f"Image format of the {layers}.", words=words, choices=COLOR_FORMATS, label="Image format of colours")
 
 
 def res_param(help: str, **more: Any) -> Any:
@@ -161,6 +162,25 @@ class CreateRendering(LayerDetails):
         if self.data is not None:
             raise BadRequest("give either --layers or --data; in --layers, the kind data is the data tile and normal, id and depth are PNG layers")
         return self.layers
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapTexts:
+    """What a map says of itself, and how it opens; None leaves a member as it is."""
+
+    title: str | None = param(None, help="Display title; empty for the scene's.", label="Title")
+    attribution: str | None = param(None, help="Attribution text; empty for the scene's.", label="Attribution")
+    description: str | None = param(
+        None, help="Description of the map for search engines and links; empty for the number of views.", label="Description for links"
+    )
+    start_view: ViewAngles | None = param(
+        None, help="View in which the map opens: look-at angle and pitch in degrees.", example="45-22.5", label="View in which the map opens"
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChangeRendering(MapTexts):
+    """Changes what the map of a rendering says and how it opens. Nothing is rendered."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,23 +9,22 @@ import numpy as np
 
 from map3d import _core
 from map3d.catalogue import Catalogue, RenderingRecord, SceneRecord, Workspace
-from map3d.errors import OutsideFrame
-from map3d.geometry.frames import check_content, pin
 from map3d.ingest.findings import Finding
 from map3d.ingest.import_options import ImportOptions
+from map3d.lifecycle.change_rendering import change_rendering
 from map3d.lifecycle.create_rendering import create_rendering
 from map3d.registry import Registry
 from map3d.requests import CreateRendering, Site
-from map3d.requests.renderings import DEFAULT_RADIUS_M
+from map3d.requests.renderings import DEFAULT_RADIUS_M, MapTexts
 from map3d.scenes.build import GROUND, open_scene
 from map3d.scenes.file_contents import file_contents, union
 from map3d.scenes.outlier_lines import middle_of, outlier_lines
 from map3d.scenes.outliers import read_outliers
 from map3d.site.files import ImportSummary, SiteFiles
+from map3d.site.later_run import LaterRun, apply_options, check_start_view
 from map3d.site.report import SiteReport, read_report, view_names, write_report
 from map3d.site.resolution import TERRAIN_CLASSES, Resolution, SurfaceDetail, choose_resolution, surface_detail
-from map3d.tiles.track_stores import remove_tracks
-from map3d.types import AO_RADIUS_M, LAYERS_BY_DATA
+from map3d.types import AO_RADIUS_M, COLOR_FORMATS, DEFAULT_DATA, LAYERS_BY_DATA
 
 AO_RADIUS_SHARE: Final = 0.25
 """Greatest radius of ambient occlusion as a share of the scene's longest side."""
@@ -33,44 +32,55 @@ AO_RADIUS_SHARE: Final = 0.25
 
 def site_files(request: Site) -> SiteFiles:
     options = ImportOptions.of(request, name=None, virtual_rasters=True)
-    return SiteFiles(SceneRecord(request.name, request.title, request.attribution), request.folder, options, request.allow_empty)
+    scene = SceneRecord(request.name, request.title or _title(request), request.attribution or "")
+    return SiteFiles(scene, request.folder, options, request.allow_empty)
+
+
+def _title(request: Site) -> str:
+    """Returns the title of a new site without one."""
+    return request.folder.resolve().stem
 
 
 @dataclass(frozen=True)
 class SiteRendering:
-    """`resolution`: None when it was given or the rendering existed; `refitted`: its frames were replaced because the content had left them;
-    `has_chosen_ao`: ambient occlusion was chosen because textures cover less than a tenth of its surfaces."""
+    """`resolution`: None when it was given or the rendering existed; `has_chosen_ao`: ambient occlusion was chosen because textures cover less than
+    a tenth of its surfaces; `changes`: of a rendering that existed."""
 
     record: RenderingRecord
     resolution: Resolution | None = None
-    refitted: bool = False
     has_chosen_ao: bool = False
+    changes: LaterRun | None = None
 
 
 def create_site_rendering(workspace: Workspace, catalogue: Catalogue, request: Site) -> SiteRendering:
-    """Creates the rendering of the site unless it exists, and replaces its frames when they no longer hold the content; its scene must be built."""
+    """Creates the rendering of the site, or changes the one that exists as the request says; its scene must be built."""
+    scene = open_scene(workspace, request.name)
     for record in catalogue.renderings(request.name):
         if record.name == request.name:
-            return _refit(workspace, catalogue, request, record)
-    scene = open_scene(workspace, request.name)
+            changes = apply_options(workspace, catalogue, request, record, scene.box, _ao_radius_m(scene))
+            return SiteRendering(changes.record, changes=changes)
+    check_start_view(request, request.angles())
     detail = _surface_detail(workspace, request.name, scene)
     resolution = None if request.res_m else choose_resolution(scene, list(request.angles()), detail)
     res_m = request.res_m if resolution is None else resolution.res_m
     has_chosen_ao = request.ao is None and detail is not None and detail.texel_m is None
-    names = LAYERS_BY_DATA[request.data] + (("ao",) if request.ao or has_chosen_ao else ())
+    names = LAYERS_BY_DATA[request.data or DEFAULT_DATA] + (("ao",) if request.ao or has_chosen_ao else ())
     rendering = CreateRendering(
         scene=request.name,
         name=request.name,
         views=request.angles(),
         res_m=res_m,
         layers=names,
-        color=request.color,
-        small=request.small,
+        color=request.color or COLOR_FORMATS[0],
+        small=bool(request.small),
         radius_m=_ao_radius_m(scene) if "ao" in names else None,
-        title=request.title,
-        attribution=request.attribution,
+        title=request.title or _title(request),
+        attribution=request.attribution or "",
     )
-    return SiteRendering(create_rendering(workspace, catalogue, rendering), resolution, has_chosen_ao=has_chosen_ao)
+    record = create_rendering(workspace, catalogue, rendering)
+    if request.description is not None or request.start_view is not None:
+        record = change_rendering(workspace, catalogue, record.name, MapTexts(description=request.description, start_view=request.start_view))
+    return SiteRendering(record, resolution, has_chosen_ao)
 
 
 def _ao_radius_m(scene: _core.Scene) -> float:
@@ -121,20 +131,6 @@ def _without_folder(text: str, folder: Path) -> str:
         if path != path.parent:
             text = text.replace(f"{path}{os.sep}", "")
     return text
-
-
-def _refit(workspace: Workspace, catalogue: Catalogue, request: Site, record: RenderingRecord) -> SiteRendering:
-    """Pins new frames, with the views, layers and resolution of the rendering, when content has left the present ones."""
-    box = open_scene(workspace, request.name).box
-    try:
-        for frame in record.frames:
-            check_content(frame, box, record.window)
-    except OutsideFrame:
-        frames = tuple(pin(box, record.tile_px, record.res_m, [frame.angles for frame in record.frames], record.window))
-        stored = catalogue.regrid(replace(record, frames=frames, box=box))
-        remove_tracks(workspace, stored)
-        return SiteRendering(stored, refitted=True)
-    return SiteRendering(record)
 
 
 def _surface_detail(workspace: Workspace, name: str, scene: _core.Scene) -> SurfaceDetail | None:

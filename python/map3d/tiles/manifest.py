@@ -82,8 +82,8 @@ class ManifestView:
 
 @dataclass(frozen=True)
 class Manifest:
-    """Everything that a client needs. `box`: of the content, local; `start`: local, None for the centre of the box; `archive_part_bytes`: size of the
-    files in which archives are divided, 0 for whole archives."""
+    """Everything that a client needs. `box`: of the content, local; `start`: local, None for the centre of the box; `start_view`: id of the view that
+    is shown first, None for the first of `views`; `archive_part_bytes`: size of the files in which archives are divided, 0 for whole archives."""
 
     name: str
     content_version: int
@@ -100,6 +100,8 @@ class Manifest:
     objects: int = 0
     geographic: Geographic | None = None
     archive_part_bytes: int = 0
+    description: str = ""
+    start_view: str | None = None
 
     def __post_init__(self) -> None:
         check_name(self.name, "rendering")
@@ -141,13 +143,14 @@ class Manifest:
             "name": self.name,
             "title": self.title,
             "attribution": self.attribution,
+            **({"description": self.description} if self.description else {}),
             "content_version": self.content_version,
             "complete": self.complete,
             "crs": {key: getattr(self.crs, key) for key in ("epsg", "wkt", "name", "vertical", "heights", "vertical_epsg")},
             **({} if self.geographic is None else {"geographic": asdict(self.geographic)}),
             "origin": list(self.origin),
             "box": [list(corner) for corner in self.box],
-            "start": {"local": list(start)},
+            "start": {"local": list(start), **({} if self.start_view is None else {"view": self.start_view})},
             "tile_px": frame.tile_px,
             "zmax": frame.zmax,
             "size_m": frame.size_m,
@@ -195,6 +198,8 @@ class Manifest:
                 objects=int(value["objects"]["count"]),
                 geographic=Geographic.load(value["geographic"]) if "geographic" in value else None,
                 archive_part_bytes=int(value.get("archive_part_bytes", 0)),
+                description=value.get("description", ""),
+                start_view=value["start"].get("view"),
             )
         except (KeyError, TypeError, ValueError, IndexError, AttributeError, Map3dError) as error:
             raise Corrupt(f"{where}: invalid manifest: {type(error).__name__}: {error}") from error

@@ -57,7 +57,8 @@ class _Window:
 
 def choose_preview(manifest: Manifest, *, aspect: float = ASPECT, min_width_px: int = MIN_WIDTH_PX) -> Preview | None:
     """Returns None while no tile of a colour layer exists. `aspect`: width divided by height."""
-    view = next((view for view in manifest.views if view.occupancy.count(0)), None)
+    views = sorted(manifest.views, key=lambda view: view.frame.id != manifest.start_view)
+    view = next((view for view in views if view.occupancy.count(0)), None)
     layer = next((layer for layers in manifest.passes for layer in layers if layer.kind in COLOR_KINDS), None)
     if view is None or layer is None:
         return None

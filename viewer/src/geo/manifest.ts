@@ -82,7 +82,8 @@ export interface ManifestJson {
   origin: Vec3;
   /** Bounding box of the content, local. */
   box: Box3;
-  start?: { local: Vec3 };
+  /** `view`: the view that is shown first; without it, the first of `views`. */
+  start?: { local: Vec3; view?: string };
   tile_px: number;
   /** Deepest level. */
   zmax: number;

@@ -370,7 +370,7 @@ export abstract class CameraController extends Evented<MapEvents> {
   protected initializeView(rendering: Rendering): void {
     const { json, views } = rendering;
     const { direction, center, zoom, minZoom, maxZoom, maxBounds } = this.options;
-    const view = views.get(direction ?? "") ?? [...views.values()][0];
+    const view = views.get(direction ?? json.start?.view ?? "") ?? [...views.values()][0];
     if (!view) return;
     if (direction !== undefined && !views.has(direction))
       this.report(new UsageError(`unknown view "${direction}"; the rendering has ${[...views.keys()].join(", ")}`));

@@ -5,11 +5,12 @@ from typing import Any, Final
 
 from map3d.catalogue import OperationState, State
 from map3d.errors import BadRequest, NotFound, Unavailable
+from map3d.lifecycle.change_rendering import change_rendering
 from map3d.lifecycle.create_rendering import create_rendering
 from map3d.lifecycle.create_scene import create_scene
 from map3d.operations.estimating import estimate_apart
 from map3d.operations.request_operation import request_operation
-from map3d.requests import CreateRendering, CreateScene
+from map3d.requests import ChangeRendering, CreateRendering, CreateScene
 from map3d.requests.json_values import from_json
 from map3d.web.api.declare_route import LIMIT, MAX_PAGE, Query, api, route
 from map3d.web.api.openapi import openapi_document
@@ -80,6 +81,11 @@ def new_rendering(body: dict[str, Any]) -> Any:
 @route("GET", "/renderings/{rendering}", "Returns a rendering.", "Rendering")
 def rendering(rendering: str) -> dict[str, Any]:
     return rendering_value(catalogue().rendering(rendering))
+
+
+@route("PATCH", "/renderings/{rendering}", "Changes texts and start view of a rendering.", "Rendering", role="editor", body="RenderingChange")
+def change(rendering: str, body: dict[str, Any]) -> dict[str, Any]:
+    return rendering_value(change_rendering(workspace(), catalogue(), rendering, from_json(ChangeRendering, body)))
 
 
 @route(

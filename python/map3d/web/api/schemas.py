@@ -6,7 +6,7 @@ from typing import Any, Final
 from map3d.catalogue import OperationState, State
 from map3d.catalogue.operation_records import OPERATION_KINDS
 from map3d.operations.arguments import ARGUMENTS
-from map3d.requests import CreateRendering, CreateScene
+from map3d.requests import ChangeRendering, CreateRendering, CreateScene
 from map3d.requests.json_values import schemas_of
 from map3d.requests.scenes import BuildSteps
 from map3d.types import LAYER_KINDS
@@ -87,6 +87,8 @@ SCHEMAS: Final[dict[str, Schema]] = {
             "scene": _NAME,
             "title": TEXT,
             "attribution": TEXT,
+            "description": TEXT,
+            "start_view": {**TEXT, "description": "Id of the view in which the map opens."},
             "res_m": {**_NUMBER, "description": "Metres per pixel at the deepest level."},
             "tile_px": COUNT,
             "levels": COUNT,
@@ -97,6 +99,7 @@ SCHEMAS: Final[dict[str, Schema]] = {
         "*",
     ),
     "NewRendering": _object({**schemas_of(CreateRendering), "scene": _NAME, "name": _NAME}, "scene name"),
+    "RenderingChange": _object(schemas_of(ChangeRendering), minProperties=1),
     "Estimate": _object(
         {
             **dict.fromkeys(("base_tiles", "tiles", "images", "bytes", "open_tiles"), COUNT),

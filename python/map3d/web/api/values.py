@@ -41,9 +41,10 @@ def _asset_head(asset: AssetRecord) -> dict[str, Any]:
 
 
 def rendering_value(rendering: RenderingRecord) -> dict[str, Any]:
-    names = ("name", "scene", "title", "attribution", "res_m", "tile_px", "content_version")
+    names = ("name", "scene", "title", "attribution", "description", "res_m", "tile_px", "content_version")
     return {
         **{name: getattr(rendering, name) for name in names},
+        "start_view": rendering.start_view or rendering.frames[0].id,
         "levels": rendering.zmax + 1,
         "views": [frame.id for frame in rendering.frames],
         "layers": [{"name": layer.name, "kind": layer.kind, "format": layer.format} for layer in rendering.layers],

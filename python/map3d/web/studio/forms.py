@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from map3d.errors import BadRequest
 from map3d.quantities import parse_size
-from map3d.requests import AddFiles, CreateRendering, CreateScene, Publish
+from map3d.requests import AddFiles, ChangeRendering, CreateRendering, CreateScene, Publish
 from map3d.requests.json_values import schemas_of
 from map3d.requests.param import RequestField, fields_of
 
@@ -13,6 +13,7 @@ FORMS: Final[Mapping[type, Collection[str]]] = {
     AddFiles: ("crs", "up", "split", "lod", "theme", "interiors", "transparency"),
     CreateScene: ("name", "title", "attribution", "crs", "ground_plane"),
     CreateRendering: ("name", "title", "directions", "pitch", "res_m", "layers", "data", "time", "day"),
+    ChangeRendering: ("title", "attribution", "description", "start_view"),
     Publish: ("folder",),
 }
 """Request → fields that the template of its form writes by hand. The others follow under "More options"."""

@@ -11,9 +11,11 @@ from map3d.catalogue import OperationRecord, RenderingRecord, State
 from map3d.catalogue.operation_records import OperationState
 from map3d.cores import usable_cores
 from map3d.errors import BadRequest, Map3dError
+from map3d.lifecycle.change_rendering import change_rendering
 from map3d.lifecycle.create_rendering import create_rendering
 from map3d.publish.published_folders import find_published, folders_of, published_folders
-from map3d.requests import CreateRendering, Publish
+from map3d.requests import ChangeRendering, CreateRendering, Publish
+from map3d.requests.json_values import from_json
 from map3d.scenes.build import is_stale
 from map3d.tiles.track_stores import read_manifest
 from map3d.types import check_name
@@ -88,6 +90,19 @@ def rendering_page(rendering: str) -> Response:
 def render(rendering: str) -> Response:
     catalogue().rendering(check_name(rendering, "rendering"))
     ask("render", rendering, **({"retry_quarantined": True} if request().form.get("retry") else {}))
+    return go_to(f"studio/renderings/{rendering}")
+
+
+@rendering_pages.post("/renderings/{rendering}/change")
+@requires("editor")
+def change(rendering: str) -> Response:
+    catalogue().rendering(check_name(rendering, "rendering"))
+    sent = request().form
+    texts = {one: sent[one].strip() for one in ("title", "attribution", "description") if one in sent}
+    try:
+        change_rendering(workspace(), catalogue(), rendering, from_json(ChangeRendering, {**form_values(ChangeRendering, sent), **texts}))
+    except BadRequest as error:
+        return _rendering_page(rendering, ImmutableMultiDict(), str(error), 400)
     return go_to(f"studio/renderings/{rendering}")
 
 
