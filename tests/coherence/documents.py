@@ -126,8 +126,8 @@ class Scene:
     workspace: Workspace
     catalogue: Catalogue
 
-    def add(self, *paths: Path, heights: str | None = None, clamp: Sequence[str] = (), unchanged: bool = False) -> None:
-        options = ImportOptions(heights=heights, clamp=tuple(clamp), skip_unchanged=unchanged)
+    def add(self, *paths: Path, heights: str | None = None, clamp: Sequence[str] = (), unchanged: bool = False, height_unit: str = "auto") -> None:
+        options = ImportOptions(heights=heights, clamp=tuple(clamp), skip_unchanged=unchanged, height_unit=height_unit)
         done = import_files(self.workspace, self.catalogue, "town", list(paths), options)
         assert not done.failed
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pyproj import Transformer
 
 from map3d.errors import BadRequest
 from tests.coherence.documents import (
@@ -20,9 +21,12 @@ from tests.coherence.documents import (
     write_houses,
     write_photo,
 )
+from tests.ingest.terrain import rasters
+from tests.odd_cities.towns import at, write_citygml
 
 pytest.importorskip("map3d._core", reason="the compiled core is not there", exc_type=ImportError)
 
+NEW_YORK = (-73.98, 40.75)
 CONTRADICTIONS = {
     "heights-at-zero",
     "heights-in-feet",
@@ -104,6 +108,33 @@ def test_heights_in_feet_are_named(tmp_path: Path, scene: Scene) -> None:
     scene.add(*files)
     assert scene.codes() & CONTRADICTIONS == {"heights-in-feet"}
     assert "--height-unit ft" in str(scene.the("heights-in-feet"))
+
+
+def write_town_of_new_york(path: Path, crs: str) -> Path:
+    """Writes a town on a ground at 500 m, whose heights are in metres whatever the unit of the plane."""
+    return write_citygml(path, crs, at(*NEW_YORK, crs), prefix=path.stem)
+
+
+def write_plain(path: Path) -> Path:
+    """Writes a flat elevation model at 500 m around New York."""
+    x, y = Transformer.from_crs("EPSG:4326", "EPSG:26918", always_xy=True).transform(*NEW_YORK)
+    transform = rasters.from_bounds(x - 500, y - 500, x + 500, y + 500, 50, 50)
+    return rasters.write(path, np.full((1, 50, 50), 500.0, dtype=np.float32), crs="EPSG:26918", transform=transform)
+
+
+@pytest.mark.parametrize("is_terrain", [True, False])
+def test_heights_in_metres_on_a_plane_in_feet_are_read_so_if_the_ground_says_it(tmp_path: Path, scene: Scene, is_terrain: bool) -> None:
+    other = write_plain(tmp_path / "dem.tif") if is_terrain else write_town_of_new_york(tmp_path / "b.gml", "EPSG:26918")
+    files = [other, write_town_of_new_york(tmp_path / "a.gml", "EPSG:2263")]
+    scene.add(*files)
+    assert scene.the("heights-read-in-metres").count == 16
+    found = [box[0][2] for name, box in scene.boxes().items() if name.startswith("ahouse")]
+    assert np.allclose(found, 500.0, atol=0.01)
+    scene.add(*files, heights="0")
+    found = scene.the("heights-in-metres" if is_terrain else "heights-in-metres-beside-file")
+    assert "--height-unit m" in str(found)
+    scene.add(*files, heights="auto", height_unit="m")
+    assert not scene.codes() & {*CONTRADICTIONS, "heights-read-in-metres", "heights-in-metres-beside-file"}
 
 
 def test_terrain_in_feet_is_named(tmp_path: Path, scene: Scene) -> None:

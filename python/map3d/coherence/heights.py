@@ -41,6 +41,7 @@ BESIDE_FILE: Final[Mapping[str, str]] = {
     "heights-ellipsoidal": "heights-ellipsoidal-beside-file",
 }
 """The codes of kinds of contradictions with the file beside."""
+IN_METRES: Final = ("heights-in-metres", BESIDE_FILE["heights-in-metres"])
 UNLIKE_FILE: Final = "heights-unlike-file"
 
 
@@ -176,7 +177,7 @@ class _Document:
         self._is_as_is = rule.heights == "as-is"
         if rule.heights != "as-is":
             self._drape(self._without_heights(), "flat-objects-draped")
-        if rule.is_by_evidence and self._is_guessed and self.found and all(found.kind == "heights-in-metres" for found in self.found):
+        if rule.is_by_evidence and self._is_guessed and self.found and all(found.kind in IN_METRES for found in self.found):
             self.decision.scale = 1 / FOOT_M
             self._note("heights-read-in-metres", self._kept)
         elif rule.offset_m is not None and is_meant:

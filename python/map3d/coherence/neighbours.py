@@ -102,14 +102,13 @@ def _of_group(
 
 
 def _right_level(files: Sequence[FileBases], offsets: Mapping[int, float]) -> float:
-    """Returns the offset of the files that fit the terrain, else of those with the most objects."""
-    weights = {number: (any(files[one].is_right for one in same), sum(len(files[one].bases) for one in same)) for number, same in _same(offsets)}
-    return offsets[max(weights, key=lambda number: (*weights[number], -number))]
+    """Returns the offset of the files that fit the terrain, else of those whose unit is known, else of those with the most objects."""
 
+    def trust(number: int) -> tuple[bool, bool, int, int]:
+        same = [files[other] for other, metres in offsets.items() if _is_same(metres, offsets[number])]
+        return any(file.is_right for file in same), not all(file.is_guessed for file in same), sum(len(file.bases) for file in same), -number
 
-def _same(offsets: Mapping[int, float]) -> Iterator[tuple[int, list[int]]]:
-    for number, metres in offsets.items():
-        yield number, [other for other, away in offsets.items() if _is_same(away, metres)]
+    return offsets[max(offsets, key=trust)]
 
 
 def _is_same(one_m: float, other_m: float) -> bool:
