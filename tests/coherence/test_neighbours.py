@@ -29,10 +29,9 @@ def beside(prefix: str, *, tiles: float = 1.0, above: float = 0.0, base: float |
 
 def of_files(*files: list[House], right: int | None = None) -> list[tuple[int, int, str, int]]:
     """Returns (file, beside, kind, metres) of what `compare_files` finds."""
-    bases = [
-        FileBases(np.array([(h.x + 5, h.y + 4, h.z) for h in houses]).reshape(-1, 3), number == right, False) for number, houses in enumerate(files)
-    ]
-    return [(found.file, found.beside, found.kind, round(found.metres)) for found in compare_files(bases, GEOID_M)]
+    points = [np.array([(h.x + 5, h.y + 4, h.z) for h in houses]).reshape(-1, 3) for houses in files]
+    bases = [FileBases(each, np.full(len(each), 12.8), number == right, False) for number, each in enumerate(points)]
+    return [(found.file, found.beside, found.kind, round(found.metres)) for found in compare_files(bases, lambda: GEOID_M)]
 
 
 def test_tiles_on_one_slope_agree() -> None:
@@ -61,8 +60,10 @@ def test_most_objects_are_right_and_so_is_who_fits_the_terrain() -> None:
     assert of_files(row[0][-4:], row[1]) == [(0, 1, "heights-below-terrain", -500)]
 
 
-def test_two_objects_are_no_evidence() -> None:
-    assert of_files(beside("a", tiles=0), beside("b", tiles=1, above=500.0)[:2]) == []
+def test_single_objects_contradict_several_others_if_they_are_far_off() -> None:
+    assert of_files(beside("a", tiles=0), beside("b", tiles=1, above=80.0)[:2]) == []
+    assert of_files(beside("a", tiles=0), beside("b", tiles=1, above=500.0)[:2]) == [(1, 0, "heights-above-terrain", 498)]
+    assert of_files(beside("a", tiles=0)[-1:], beside("b", tiles=1, above=500.0)[:2]) == [], "two against one are no evidence"
 
 
 @pytest.mark.parametrize(("above", "code"), [(-500.0, "heights-unlike-file"), (46.5, "heights-ellipsoidal-beside-file")])

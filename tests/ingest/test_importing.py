@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -219,3 +220,18 @@ def test_codes_have_the_names_of_their_list(workspace: Workspace, catalogue: Cat
         with Registry(workspace.registry_path("town")) as registry:
             (found,) = [item.attributes for item in registry.objects() if item.name == "B1"]
         assert found == expected
+
+
+def test_the_same_file_has_the_same_versions_on_every_later_day(tmp_path: Path, workspace: Workspace, catalogue: Catalogue) -> None:
+    building = '<bldg:Building gml:id="a">'
+    both = gml(("a", UTM_RING, UTM), ("b", UTM_RING.replace("6910", "6911"), UTM))
+    text = both.replace(building, f"{building}<core:terminationDate>2100-01-01</core:terminationDate>")
+    done = add(workspace, catalogue, tmp_path / "a.gml", text)
+    assert (done.objects, len(done.report["versions_on"])) == (2, 10)
+    (asset,) = catalogue.assets("town")
+    catalogue.put_asset(replace(asset, report={**asset.report, "versions_on": "2100-01-02"}))
+    again = add(workspace, catalogue, tmp_path / "a.gml", text)
+    assert (again.objects, again.report["versions_on"]) == (1, "2100-01-02"), "as on the day of its first import"
+    changed = add(workspace, catalogue, tmp_path / "a.gml", text + "\n")
+    assert (changed.objects, changed.report["versions_on"]) == (2, done.report["versions_on"]), "another file, another day"
+    assert "versions_on" not in add(workspace, catalogue, tmp_path / "a.gml", both).report, "no object has an end"

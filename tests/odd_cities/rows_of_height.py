@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from pyproj import Transformer
+from pyproj import CRS, Transformer
 
 from tests.coherence.documents import EAST, NORTH, STEP_M, UTM, town, write_dem, write_flat, write_houses, write_photo
 from tests.odd_cities.contradictions import Row
@@ -27,6 +27,15 @@ def _tiles(folder: Path, *, base: float | None = None, above: float = 0.0, facto
     write_houses(folder / "south.gml", town("s"))
     houses = town("n", base=base, above=above, factor=factor, side=3)
     write_houses(folder / "north.gml", [replace(house, y=house.y + 4 * STEP_M) for house in houses])
+
+
+def _model(folder: Path) -> None:
+    """Writes a town, and between its houses a model that is one object 500 m below."""
+    write_houses(folder / "town.gml", town())
+    corners = [(EAST + x, NORTH + y, z) for z in (8.0, 14.0) for x, y in ((22.0, 20.0), (30.0, 20.0), (30.0, 28.0), (22.0, 28.0))]
+    faces = ["f 4 3 2 1", "f 5 6 7 8", *(f"f {k + 1} {(k + 1) % 4 + 1} {(k + 1) % 4 + 5} {k + 5}" for k in range(4))]
+    (folder / "model.obj").write_text("\n".join([*(f"v {x} {y} {z}" for x, y, z in corners), *faces]))
+    (folder / "model.prj").write_text(CRS(UTM).to_wkt("WKT1_ESRI"))
 
 
 def _with(write: Callable[[Path], object], folder: Path) -> None:
@@ -76,6 +85,7 @@ HEIGHT: list[Row] = [
     Row("the same tile, set on the ground", partial(_tiles, base=0.0), TILES, (*TILES_M, 15.0), 25, ("objects-clamped",), {"heights": "clamp"}),
     Row("a tile on the ellipsoid", partial(_tiles, above=46.5), TILES, (*TILES_M, 59.5), 25, ("heights-ellipsoidal-beside-file",)),
     Row("a tile in feet", partial(_tiles, factor=1 / 0.3048), TILES, (*TILES_M, 1194.6), 25, ("heights-in-feet-beside-file",)),
+    Row("a model of one object 500 m below", _model, TOWN, (130.0, 128.0, 512.0), 17, ("heights-unlike-file", "model-placed")),
     Row("roads without heights", partial(_with, _roads), TOWN, TOWN_M, 17, ("flat-objects-draped", "polygon-without-height")),
     Row(
         "a photo without elevation model",

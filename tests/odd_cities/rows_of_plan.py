@@ -14,6 +14,7 @@ from tests.odd_cities.towns import MUNICH, LonLat, at, houses, write_citygml
 WARSAW, FIELDS, NEW_YORK, TOKYO, LONDON = (21.010, 52.231), (18.5, 52.7), (-73.98, 40.75), (139.70, 35.68), (-0.12, 51.5)
 HONG_KONG, SINGAPORE, BUCHAREST = (114.17, 22.30), (103.85, 1.29), (26.10, 44.43)
 MONTREAL, EAST_OF_LONDON = (-73.57, 45.50), (-0.118, 51.5)
+NEAR_MUNICH = (MUNICH[0] + 0.003, MUNICH[1])
 BESIDE_FIELDS = (18.5, 52.703)
 EAST_FIRST, NORTH_FIRST = (0, 1, 2), (1, 0, 2)
 URN = "urn:ogc:def:crs:EPSG::"
@@ -94,6 +95,12 @@ def metres_in_feet(folder: Path, text: str = "") -> None:
         parts[0]
         + "".join((text % height if text else "") + "<bldg:lod1MultiSurface>" + part for height, part in zip(heights, parts[1:], strict=True))
     )
+
+
+def without_zone(folder: Path) -> None:
+    """Writes a town in zone 4 of Gauss and Krüger, northing first, without the 4 before the easting."""
+    in_zone = at(*MUNICH, "EPSG:31468")
+    write_citygml(folder / "town.gml", URN + "31468", lambda corners: (in_zone(corners) - [4_000_000.0, 0.0, 0.0])[:, [1, 0, 2]])
 
 
 def degrees(place: LonLat, label: str, crs: str = "EPSG:4326") -> Build:
@@ -295,4 +302,24 @@ UNITS: list[Row] = [
     ),
 ]
 
-PLAN: list[Row] = [*AXES, *STRAYS, *PLACES, *DATUMS, *UNITS]
+PREFIXES: list[Row] = [
+    Row("EPSG:4647 without the zone", town("EPSG:4647", MUNICH, "EPSG:25832"), *only("EPSG:4647", MUNICH), 16, ("easting-zone-prefix",)),
+    Row("EPSG:25832 with the zone", town("EPSG:25832", MUNICH, "EPSG:4647"), *only("EPSG:25832", MUNICH), 16, ("easting-zone-prefix",)),
+    Row(
+        "a zone of Gauss and Krüger that is missing, northing first",
+        without_zone,
+        *only("EPSG:31468", MUNICH),
+        16,
+        ("easting-zone-prefix",),
+    ),
+    Row(
+        "with the zone beside without it",
+        files(("a", "EPSG:25832", MUNICH, "EPSG:4647", EAST_FIRST, 4), ("b", "EPSG:4647", NEAR_MUNICH, "EPSG:25832", EAST_FIRST, 4)),
+        *extent("EPSG:25832", corners("EPSG:25832", MUNICH), corners("EPSG:25832", NEAR_MUNICH)),
+        32,
+        ("easting-zone-prefix",),
+    ),
+    Row("EPSG:4647 with the zone", town("EPSG:4647", MUNICH, "EPSG:4647"), *only("EPSG:4647", MUNICH), 16),
+]
+
+PLAN: list[Row] = [*PREFIXES, *AXES, *STRAYS, *PLACES, *DATUMS, *UNITS]

@@ -65,20 +65,39 @@ export function nameOfResult(label: string): string {
   return label.replace(/^\S*(?:\d{3}|_)\S*(?:, |$)/, "") || (/\d/.test(label) ? message("object") : label.replaceAll("_", " "));
 }
 
+/** After the name of a measure: the attribute with its unit, where that is not metres. */
+const UNIT = "/unit";
+const unitOf = (attributes: Readonly<Record<string, Attribute>>, key: string): string => {
+  const unit = attributes[`${key}${UNIT}`];
+  return typeof unit === "string" ? unit : "";
+};
+
 /** Lists what the card says of an object's use, age, size and roof, besides its title. */
 function listFacts(attributes: Readonly<Record<string, Attribute>>, title: string): Row[] {
   const text = (key: string): string => (isWords(attributes[key]) ? attributes[key] : "");
   const number = (key: string): string => (isNumber(attributes[key]) ? format(attributes[key]) : "");
   const height = number("measuredHeight");
+  const unit = unitOf(attributes, "measuredHeight") || "m";
   const year = number("yearOfConstruction");
   const rows: [MessageKey, string][] = [
     ["use", [text("function"), text("usage")].find((each) => each !== "" && each !== title) ?? ""],
     ["built", title.endsWith(year) ? "" : year],
-    ["measuredHeight", height && `${height} m`],
+    ["measuredHeight", height && `${height} ${unit}`],
     ["storeys", number("storeysAboveGround")],
     ["roof", roofInWords(text("roofType"))],
   ];
   return rows.filter(([, value]) => value !== "").map(([key, value]) => [message(key), value]);
+}
+
+/** Lists attributes as the data names them, measures with their unit. */
+function listAttributes(attributes: Readonly<Record<string, Attribute>>): Row[] {
+  return Object.entries(attributes)
+    .filter(([key]) => !key.endsWith(UNIT) || attributes[key.slice(0, -UNIT.length)] === undefined)
+    .map(([key, value]): Row => [
+      key,
+      typeof value === "number" ? `${format(value)} ${unitOf(attributes, key)}`.trim() : formatValue(value),
+    ])
+    .filter(([, value]) => value !== "");
 }
 
 /** Describes a picked object. @param lonLat of its position, where known */
@@ -129,9 +148,7 @@ export function describe(
     ...(isGround ? [] : place),
     ...(id > 0 ? [["id", String(id)] as const] : []),
     ...(name !== undefined && name !== title ? [["gml:id", name] as const] : []),
-    ...Object.entries(attributes)
-      .map(([key, value]) => [key, formatValue(value)] as const)
-      .filter(([, value]) => value !== ""),
+    ...listAttributes(attributes),
   ];
   return {
     title,
@@ -143,8 +160,7 @@ export function describe(
   };
 }
 
-function formatValue(value: Attribute): string {
+function formatValue(value: string | boolean | null): string {
   if (value === null) return "–";
-  if (typeof value === "number") return format(value);
   return typeof value === "boolean" ? message(value ? "yes" : "no") : value;
 }

@@ -166,7 +166,11 @@ fn versions_that_have_ended_are_left_out_unless_their_date_is_requested() {
         assert_eq!((names(&document), document.count()), (expected.to_vec(), 2 * expected.len()), "{at:?}");
         assert_eq!((document.reported("version-ended"), document.reported("version-of-other-date")), (ended, others), "{at:?}");
     }
-    assert!(map3d_read::open(&Folder::new("at").put("a.gml", &text), &CITYGML, &of_format(json!({"at": "soon"}))).is_err());
+    let earlier = read_text(&text, &of_format(json!({"versions_on": "2010-06-29"})));
+    assert_eq!((names(&earlier), earlier.reported("version-ended")), (vec!["old", "new", "planned"], 0));
+    for options in [json!({"at": "soon"}), json!({"versions_on": "soon"})] {
+        assert!(map3d_read::open(&Folder::new("at").put("a.gml", &text), &CITYGML, &of_format(options)).is_err());
+    }
 }
 
 #[test]

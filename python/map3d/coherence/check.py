@@ -8,6 +8,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,6 +21,7 @@ from map3d.catalogue.records import HEIGHTS_DIFFER
 from map3d.catalogue.scene_lock import scene_lock
 from map3d.coherence.datums import share_heights
 from map3d.coherence.ground import Ground, find_ground, terrain_surfaces
+from map3d.coherence.height_kinds import GeoidHeight
 from map3d.coherence.height_rules import CLAMP, HEIGHTS, OF_FILES, HeightRules, with_choice, with_choice_of_files
 from map3d.coherence.heights import HeightDecision, decide_heights, settled_ground
 from map3d.coherence.same_objects import find_same_objects
@@ -85,7 +87,7 @@ def check_locked_scene(workspace: Workspace, catalogue: Catalogue, scene: str) -
     surveyed = [SurveyedAsset(asset, folders[asset.name]) for asset in assets]
     same = find_same_objects(surveyed)
     ground = find_ground(surveyed, same.kept)
-    decisions = decide_heights(surveyed, same.kept, ground, HeightRules.of(record.options), geoid_m(record, surveyed))
+    decisions = decide_heights(surveyed, same.kept, ground, HeightRules.of(record.options), geoid_height(record, surveyed))
     ground = settled_ground(surveyed, same.kept, decisions, ground)
     adjusted = _adjust(surveyed, same.kept, decisions, ground)
     with Registry(workspace.registry_path(scene)) as registry:
@@ -134,8 +136,12 @@ def _choose_option(catalogue: Catalogue, record: SceneRecord, name: str, value: 
     _set_options(catalogue, record, {**others, name: value} if value else others)
 
 
-def geoid_m(record: SceneRecord, assets: Sequence[SurveyedAsset]) -> float | None:
-    """Returns the geoid above the ellipsoid in the middle of the scene; None in local metres."""
+def geoid_height(record: SceneRecord, assets: Sequence[SurveyedAsset]) -> GeoidHeight:
+    """Returns what computes the height of the geoid in the middle of the scene, which is unknown in local metres, when it is needed first."""
+    return cache(partial(_geoid_m, record, assets))
+
+
+def _geoid_m(record: SceneRecord, assets: Sequence[SurveyedAsset]) -> float | None:
     boxes = [asset.boxes[asset.drawn] for asset in assets if not asset.has_heights and asset.drawn.any()]
     if record.crs is None or record.crs.wkt is None or not boxes:
         return None

@@ -1,5 +1,6 @@
 """What explains that objects are not on the ground: heights of 0, in another unit, or above another surface."""
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -15,20 +16,23 @@ AT_ZERO_M: Final = 0.01
 LEAST_GEOID_M: Final = 18.0
 FEET_SHARE: Final = 0.02
 
+GeoidHeight = Callable[[], float | None]
+"""Returns the geoid above the ellipsoid in metres, None if unknown."""
+
 GROUND_KINDS: Final = ("terrain-in-feet", "terrain-ellipsoidal")
 """Kinds by which the ground is wrong, not the objects."""
 
 
-def find_kind(base: Floats, ground: Floats, *, is_guessed: bool, geoid_m: float | None) -> str:
+def find_kind(base: Floats, ground: Floats, *, is_guessed: bool, geoid: GeoidHeight) -> str:
     """Returns the kind of contradiction, which is the code of its message: constant distances are heights of another kind, others another unit.
 
     `base`, `ground`: (n,) heights of objects and of the ground below them; `is_guessed`: whether the unit of the objects' heights is that of their
-    plane for want of anything better; `geoid_m`: the geoid above the ellipsoid, None if unknown.
+    plane for want of anything better.
     """
     if are_zero(base):
         return "heights-at-zero"
     metres, deviation = robust_middle(base - ground)
-    by_geoid = _kind_by_geoid(metres, geoid_m) if deviation <= TOLERANCE_M / 2 else None
+    by_geoid = _kind_by_geoid(metres, geoid()) if deviation <= TOLERANCE_M / 2 else None
     by_unit = _kind_by_unit(base, ground, deviation, is_guessed=is_guessed)
     found = (by_unit or by_geoid) if is_guessed else (by_geoid or by_unit)
     return found or ("heights-below-terrain" if metres < 0 else "heights-above-terrain")

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from map3d.coherence.ground import STANDING, Ground, bases_of
-from map3d.coherence.height_kinds import DEVIATIONS, GROUND_KINDS, TOLERANCE_M, find_kind, robust_middle
+from map3d.coherence.height_kinds import DEVIATIONS, GROUND_KINDS, TOLERANCE_M, GeoidHeight, find_kind, robust_middle
 from map3d.coherence.height_rules import HeightRules
 from map3d.coherence.height_units import FOOT_M, is_guessed
 from map3d.coherence.neighbours import FileBases, FileDifference, compare_files
@@ -73,17 +73,17 @@ class HeightDecision:
 
 
 def decide_heights(
-    assets: Sequence[SurveyedAsset], kept: Mapping[str, Flags], ground: Ground, rules: HeightRules, geoid_m: float | None
+    assets: Sequence[SurveyedAsset], kept: Mapping[str, Flags], ground: Ground, rules: HeightRules, geoid: GeoidHeight
 ) -> dict[str, HeightDecision]:
-    """Returns a decision for each document. `kept`: asset → (wholes,) whether a whole is drawn; `geoid_m`: above the ellipsoid, None if unknown."""
-    documents = [_Document(asset, kept[asset.name], ground, geoid_m) for asset in assets if not asset.is_raster]
-    _judge(documents, ground, geoid_m)
+    """Returns a decision for each document. `kept`: asset → (wholes,) whether a whole is drawn."""
+    documents = [_Document(asset, kept[asset.name], ground, geoid) for asset in assets if not asset.is_raster]
+    _judge(documents, ground, geoid)
     for rule, names in rules.groups([document.asset.name for document in documents]):
         group = [document for document in documents if document.asset.name in names]
         are_meant = any(document.contradicts for document in group)
         for document in group:
             document.decide(rule, is_meant=document.contradicts or not are_meant)
-    _judge(documents, ground, geoid_m)
+    _judge(documents, ground, geoid)
     _unite(documents)
     return {document.asset.name: document.finish() for document in documents}
 
@@ -105,12 +105,12 @@ def standing_bases(assets: Sequence[SurveyedAsset], kept: Mapping[str, Flags], d
     return np.concatenate(found)
 
 
-def _judge(documents: Sequence["_Document"], ground: Ground, geoid_m: float | None) -> None:
+def _judge(documents: Sequence["_Document"], ground: Ground, geoid: GeoidHeight) -> None:
     """Finds what contradicts the terrain, then what contradicts the files beside it, then single objects, with heights as decided so far."""
     for document in documents:
         document.judge()
     compared = [document for document in documents if not document.found]
-    differences = compare_files([document.file_bases() for document in compared], geoid_m)
+    differences = compare_files([document.file_bases() for document in compared], geoid)
     for difference in differences:
         compared[difference.file].contradict(difference, compared[difference.beside].asset)
     moved = any(not document.decision.is_plain for document in documents)
@@ -127,8 +127,8 @@ def _judge(documents: Sequence["_Document"], ground: Ground, geoid_m: float | No
 class _Document:
     """The heights of one document beside the ground."""
 
-    def __init__(self, asset: SurveyedAsset, kept: Flags, ground: Ground, geoid_m: float | None) -> None:
-        self.asset, self.kept, self._geoid_m = asset, kept, geoid_m
+    def __init__(self, asset: SurveyedAsset, kept: Flags, ground: Ground, geoid: GeoidHeight) -> None:
+        self.asset, self.kept, self._geoid = asset, kept, geoid
         self._kept = kept & asset.drawn & ~asset.is_terrain
         self._sound = self._kept & ~_reach_far(asset, self._kept)
         self._low, self._high = asset.boxes[:, 0, 2], asset.boxes[:, 1, 2]
@@ -153,9 +153,9 @@ class _Document:
     def file_bases(self) -> FileBases:
         """Returns what is compared with the files beside this one."""
         chosen = self._compared()
-        middles = (self.asset.boxes[chosen, 0, :2] + self.asset.boxes[chosen, 1, :2]) / 2
+        low, high = self.asset.boxes[chosen, 0, :2], self.asset.boxes[chosen, 1, :2]
         is_right = bool(np.isfinite(self._terrain[chosen]).sum() * 2 > chosen.sum())
-        return FileBases(np.column_stack([middles, self._bases[chosen]]), is_right, self._is_guessed)
+        return FileBases(np.column_stack([(low + high) / 2, self._bases[chosen]]), np.hypot(*(high - low).T), is_right, self._is_guessed)
 
     def contradict(self, difference: FileDifference, beside: SurveyedAsset) -> None:
         """Takes what contradicts the file beside this one. Objects on terrain fit that."""
@@ -226,7 +226,7 @@ class _Document:
         metres, deviation = robust_middle(base - terrain)
         if abs(metres) <= max(TOLERANCE_M, DEVIATIONS * deviation):
             return None
-        return Contradiction(find_kind(base, terrain, is_guessed=self._is_guessed, geoid_m=self._geoid_m), metres, chosen)
+        return Contradiction(find_kind(base, terrain, is_guessed=self._is_guessed, geoid=self._geoid), metres, chosen)
 
     def _strays(self, bases: Floats, judged: Flags) -> Iterator[Contradiction]:
         """Finds single objects that stand far above or below the ground on which the others of their class stand."""

@@ -12,14 +12,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from map3d.coherence.height_kinds import DEVIATIONS, GROUND_KINDS, TOLERANCE_M, are_zero, find_kind, robust_middle
+from map3d.coherence.height_kinds import DEVIATIONS, GROUND_KINDS, TOLERANCE_M, GeoidHeight, are_zero, find_kind, robust_middle
 from map3d.coherence.surveyed_assets import Floats
 
 CELL_M: Final = 50.0
 STEEPEST: Final = 0.5
 """Rise of the ground, in metres per metre, that explains the distance between the bases of two cells."""
 LEAST_OBJECTS: Final = 3
-"""Least number of objects of each of two files in cells that are compared."""
+LONE_M: Final = 100.0
+"""Least number of objects of each of two files in cells that are compared. Fewer ones, as of a model that is one object, contradict several others by
+this distance."""
 SAME_LEVEL: Final = 0.1
 """Part of the distance between two files by which others may differ that are as far from them."""
 
@@ -28,9 +30,11 @@ Numbers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class FileBases:
-    """What stands in one file. `bases`: (n, 3) world coordinates; `is_right`: whether they fit the terrain; `is_guessed`: as in `find_kind`."""
+    """What stands in one file. `bases`: (n, 3) world coordinates; `sizes`: (n,) metres across; `is_right`: whether they fit the terrain;
+    `is_guessed`: as in `find_kind`."""
 
     bases: Floats
+    sizes: Floats
     is_right: bool
     is_guessed: bool
 
@@ -47,11 +51,13 @@ class FileDifference:
 
 @dataclass(frozen=True)
 class _Pair:
-    """Heights of two files in cells that touch: (n,) each; `apart_m` from the middle of one to that of the other."""
+    """Heights of two files in cells that touch: (n,) each; `apart_m` from the middle of one to that of the other, with half the sizes of objects;
+    `least_m`: distance that contradicts anyway."""
 
     one: Floats
     other: Floats
     apart_m: Floats
+    least_m: float
 
     @cached_property
     def metres(self) -> float:
@@ -62,37 +68,37 @@ class _Pair:
     def contradicts(self) -> bool:
         """Whether the distance is more than a slope explains."""
         metres, deviation = robust_middle(self.one - self.other)
-        return abs(metres) > max(TOLERANCE_M + STEEPEST * float(np.median(self.apart_m)), DEVIATIONS * deviation)
+        return abs(metres) > max(self.least_m + STEEPEST * float(np.median(self.apart_m)), DEVIATIONS * deviation)
 
     @property
     def turned(self) -> "_Pair":
-        return _Pair(self.other, self.one, self.apart_m)
+        return _Pair(self.other, self.one, self.apart_m, self.least_m)
 
 
-def compare_files(files: Sequence[FileBases], geoid_m: float | None) -> list[FileDifference]:
-    """Returns the files that contradict those beside them, in their order. `geoid_m`: as in `find_kind`."""
+def compare_files(files: Sequence[FileBases], geoid: GeoidHeight) -> list[FileDifference]:
+    """Returns the files that contradict those beside them, in their order."""
     pairs = dict(_pairs(files))
     if not any(pair.contradicts for pair in pairs.values()):
         return []
     levels = _levels(len(files), pairs)
     found: list[FileDifference] = []
     for group in _touching(levels, pairs):
-        found += _of_group(files, pairs, group, geoid_m)
+        found += _of_group(files, pairs, group, geoid)
     return sorted(found, key=lambda difference: difference.file)
 
 
 def _of_group(
-    files: Sequence[FileBases], pairs: Mapping[tuple[int, int], _Pair], offsets: Mapping[int, float], geoid_m: float | None
+    files: Sequence[FileBases], pairs: Mapping[tuple[int, int], _Pair], offsets: Mapping[int, float], geoid: GeoidHeight
 ) -> Iterator[FileDifference]:
     """Judges files that touch each other. `offsets`: file → metres from the first of them."""
     right_m = _right_level(files, offsets)
     wrong = [number for number, metres in offsets.items() if not _is_same(metres, right_m)]
     right = [number for number in offsets if number not in wrong]
-    of_wrong = {number: _kind(files, pairs, number, right, geoid_m) for number in wrong}
+    of_wrong = {number: _kind(files, pairs, number, right, geoid) for number in wrong}
     known = {kind for kind in of_wrong.values() if kind is not None}
     if known and known <= set(GROUND_KINDS) and not any(files[number].is_right for number in right):
         wrong, right = right, wrong
-        of_wrong = {number: _kind(files, pairs, number, right, geoid_m) for number in wrong}
+        of_wrong = {number: _kind(files, pairs, number, right, geoid) for number in wrong}
         right_m = float(np.median([offsets[number] for number in right]))
         known = {kind for kind in of_wrong.values() if kind is not None}
     for number in wrong:
@@ -115,7 +121,7 @@ def _is_same(one_m: float, other_m: float) -> bool:
     return abs(one_m - other_m) <= max(TOLERANCE_M, SAME_LEVEL * max(abs(one_m), abs(other_m)))
 
 
-def _kind(files: Sequence[FileBases], pairs: Mapping[tuple[int, int], _Pair], number: int, right: Sequence[int], geoid_m: float | None) -> str | None:
+def _kind(files: Sequence[FileBases], pairs: Mapping[tuple[int, int], _Pair], number: int, right: Sequence[int], geoid: GeoidHeight) -> str | None:
     """Returns what explains the distance of a file from the right ones that it touches; None if it touches none."""
     touched = [pair for other in right if (pair := _pair(pairs, number, other)) is not None]
     if not touched:
@@ -123,7 +129,7 @@ def _kind(files: Sequence[FileBases], pairs: Mapping[tuple[int, int], _Pair], nu
     base, ground = (np.concatenate(values) for values in zip(*((pair.one, pair.other) for pair in touched), strict=True))
     if are_zero(ground) and not are_zero(base):
         return GROUND_KINDS[0]
-    return find_kind(base, ground, is_guessed=files[number].is_guessed, geoid_m=geoid_m)
+    return find_kind(base, ground, is_guessed=files[number].is_guessed, geoid=geoid)
 
 
 def _beside(pairs: Mapping[tuple[int, int], _Pair], number: int, right: Sequence[int]) -> int:
@@ -184,9 +190,11 @@ def _pairs(files: Sequence[FileBases]) -> Iterator[tuple[tuple[int, int], _Pair]
     starts = np.flatnonzero(np.any(np.diff(both, axis=0, prepend=-1) != 0, axis=1))
     for start, end in zip(starts, [*starts[1:], len(one)], strict=True):
         own, beside = one[start:end], other[start:end]
-        if min(cells.counts[np.unique(own)].sum(), cells.counts[np.unique(beside)].sum()) >= LEAST_OBJECTS:
-            apart_m = np.hypot(*(cells.middles[own] - cells.middles[beside]).T)
-            yield (int(both[start, 0]), int(both[start, 1])), _Pair(cells.heights[own], cells.heights[beside], apart_m)
+        fewer, more = sorted(int(cells.counts[np.unique(side)].sum()) for side in (own, beside))
+        if more >= LEAST_OBJECTS:
+            apart_m = np.hypot(*(cells.middles[own] - cells.middles[beside]).T) + (cells.sizes[own] + cells.sizes[beside]) / 2
+            least_m = TOLERANCE_M if fewer >= LEAST_OBJECTS else LONE_M
+            yield (int(both[start, 0]), int(both[start, 1])), _Pair(cells.heights[own], cells.heights[beside], apart_m, least_m)
 
 
 class _Cells:
@@ -194,10 +202,11 @@ class _Cells:
 
     def __init__(self, files: Sequence[FileBases]) -> None:
         bases = np.concatenate([file.bases for file in files]) if files else np.empty((0, 3))
+        sizes = np.concatenate([file.sizes for file in files]) if files else np.empty(0)
         owners = np.repeat(np.arange(len(files)), [len(file.bases) for file in files])
         keys = _key(np.floor(bases[:, :2] / CELL_M).astype(np.int64))
         order = np.lexsort((bases[:, 2], owners, keys))
-        bases, owners, keys = bases[order], owners[order], keys[order]
+        bases, sizes, owners, keys = bases[order], sizes[order], owners[order], keys[order]
         is_first = np.ones(len(keys), dtype=bool)
         is_first[1:] = (keys[1:] != keys[:-1]) | (owners[1:] != owners[:-1])
         starts = np.flatnonzero(is_first)
@@ -205,6 +214,7 @@ class _Cells:
         self.keys: Numbers = keys[starts]
         self.owners: Numbers = owners[starts]
         self.heights: Floats = bases[starts + (self.counts - 1) // 2, 2]
+        self.sizes: Floats = np.maximum.reduceat(sizes, starts) if len(starts) else np.empty(0)
         self.middles: Floats = np.add.reduceat(bases[:, :2], starts, axis=0) / self.counts[:, None] if len(starts) else np.empty((0, 2))
 
     def touching(self) -> tuple[Numbers, Numbers]:

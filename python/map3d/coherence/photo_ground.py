@@ -4,7 +4,7 @@ import numpy as np
 
 from map3d import _core
 from map3d.catalogue import AssetRecord, Catalogue, Workspace
-from map3d.coherence.check import geoid_m
+from map3d.coherence.check import geoid_height
 from map3d.coherence.ground import find_ground
 from map3d.coherence.height_rules import HeightRules
 from map3d.coherence.heights import decide_heights, settled_ground, standing_bases
@@ -19,7 +19,7 @@ def photo_ground(workspace: Workspace, catalogue: Catalogue, scene: str) -> Grou
     assets = [SurveyedAsset(asset, workspace.asset_folder(scene, asset.name)) for asset in catalogue.assets(scene) if "rasters" not in asset.report]
     kept = find_same_objects(assets).kept
     ground = find_ground(assets, kept)
-    decisions = decide_heights(assets, kept, ground, HeightRules.of(record.options), geoid_m(record, assets))
+    decisions = decide_heights(assets, kept, ground, HeightRules.of(record.options), geoid_height(record, assets))
     ground = settled_ground(assets, kept, decisions, ground)
     boxes = np.concatenate([asset.boxes[asset.drawn & asset.is_terrain] for asset in assets]) if ground.surfaces else np.empty((0, 2, 3))
     if not len(boxes):

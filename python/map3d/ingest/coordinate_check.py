@@ -17,6 +17,7 @@ from map3d.ingest.axis_order import facing_axes, is_north_first, labelled_axes, 
 from map3d.ingest.document_sample import Ring
 from map3d.ingest.evidence import Evidence
 from map3d.ingest.findings import finding
+from map3d.ingest.zone_prefix import prefix_shifts_m
 from map3d.requests.reading import Axes
 
 Points = NDArray[np.float64]
@@ -81,6 +82,8 @@ class CoordinateCheck:
         self._scene_area = None if target is None else AreaOfUse.of(horizontal_crs(target))
         self._box = None if self._area is None else self._area.source_box(self._horizontal)
         self._swap: bool | None = None
+        self._shift_m = 0.0
+        """Added to eastings whose zone is written other than the CRS expects it."""
         self._axes_findings: list[dict[str, Any]] = []
         self._points = self._outside = 0
         self._outside_example = self._outside_hint = ""
@@ -97,6 +100,8 @@ class CoordinateCheck:
             self._decide(points)
         if self._swap:
             points = np.ascontiguousarray(points[:, [1, 0, 2]])
+        if self._shift_m:
+            points = points + np.array([self._shift_m, 0.0, 0.0])
         self._count_outside(points)
         return points
 
@@ -104,11 +109,13 @@ class CoordinateCheck:
         """Returns (m, 12) prototype-to-source transforms in the axis order that the CRS expects."""
         if self._swap is None and len(transforms):
             self.ordered(transforms.reshape(-1, 3, 4)[:, :, 3])
-        if not self._swap:
+        if not self._swap and not self._shift_m:
             return transforms
-        swapped = transforms.copy()
-        swapped[:, [3, 7]] = transforms[:, [7, 3]]
-        return swapped
+        ordered = transforms.copy()
+        if self._swap:
+            ordered[:, [3, 7]] = transforms[:, [7, 3]]
+        ordered[:, 3] += self._shift_m
+        return ordered
 
     @property
     def findings(self) -> list[dict[str, Any]]:
@@ -128,10 +135,13 @@ class CoordinateCheck:
         decision = self.decision(finite, middle)
         self._swap = decision.axes != self._expected
         self.axes = decision.axes
-        self.middle = middle[::-1] if self._swap else middle
+        self.middle = (middle[::-1] if self._swap else middle) + np.array([self._shift_m, 0.0])
         position = decision.places[decision.axes]
         self.place = None if position is None else find_place(*position)
         self._axes_findings = list(self._describe_axes(decision, middle))
+        if self._shift_m:
+            read = f"{self.middle[0]:.10g} {self.middle[1]:.10g}, {self.place}"
+            self._axes_findings.append(finding("easting-zone-prefix", 1, f"{middle[0]:.10g} {middle[1]:.10g} is read as {read}"))
 
     def _positions(self, points: Points) -> Points:
         """Returns the positions of the sample or the first ones of the file, whichever are more."""
@@ -146,6 +156,7 @@ class CoordinateCheck:
 
     def decision(self, points: Points, middle: NDArray[np.float64]) -> AxisDecision:
         """Decides the order of axes. `points`: finite; `middle`: (2,), their median."""
+        self._shift_m = self._find_shift(middle)
         places: Places = {"east-north": self._degrees(*middle), "north-east": self._degrees(*middle[::-1])}
         axes = self._own_axes(points, places)
         if axes != "auto":
@@ -195,15 +206,26 @@ class CoordinateCheck:
         inside = [axes for axes, place in places.items() if place is not None and self._scene_area.contains(*place)]
         return inside[0] if len(inside) == 1 else "auto"
 
+    def _find_shift(self, middle: NDArray[np.float64]) -> float:
+        """Returns what is added to eastings so that they lead into the area of the CRS, into which they do not lead as they are."""
+        self._shift_m = 0.0
+        if self._area is None or self._axes_known or self._reaches(middle):
+            return 0.0
+        for shift_m in prefix_shifts_m(self._horizontal):
+            self._shift_m = shift_m
+            if self._reaches(middle):
+                return shift_m
+        return 0.0
+
     def _degrees(self, east: float, north: float) -> LonLat | None:
         """Returns longitude and latitude; None if the position is not on Earth."""
-        lon, lat = self._to_degrees.transform(float(east), float(north))
+        lon, lat = self._to_degrees.transform(float(east) + self._shift_m, float(north))
         on_earth = np.isfinite([lon, lat]).all() and abs(lon) <= 360.0 and abs(lat) <= 90.0
         return (float(lon), float(lat)) if on_earth else None
 
     def _as_expected(self, xy: NDArray[np.float64]) -> LonLat | None:
-        """Returns longitude and latitude of a position in the order that the CRS expects."""
-        return self._degrees(*(xy[::-1] if self._expected == "north-east" else xy))
+        """Returns longitude and latitude of an ordered position."""
+        return self._degrees(*((xy[1], xy[0]) if self._expected == "north-east" else (xy[0] - self._shift_m, xy[1])))
 
     def _fits(self, lon: float, lat: float) -> bool:
         return self._area is None or self._area.contains(lon, lat)

@@ -13,6 +13,8 @@ from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.sources import SourceDocument, source_digest
 
 _REPORT_KEY: Final = "inputs"
+VERSIONS_ON: Final = "versions_on"
+"""An option of the reader, and in the report of a file some of whose objects have an end: the day that decides which of them have ended."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,13 @@ class ImportInputs:
     def report(self) -> dict[str, Any]:
         """Returns the part of an import report from which `changes` explains a later import."""
         return {_REPORT_KEY: asdict(self)}
+
+    def of_last_import(self, asset: AssetRecord | None) -> dict[str, Any]:
+        """Returns options of the reader that decided the last import of the same files: the day on which versions of objects were current."""
+        before = {} if asset is None else asset.report
+        if before.get(_REPORT_KEY, {}).get("files") != self.files or VERSIONS_ON not in before:
+            return {}
+        return {VERSIONS_ON: before[VERSIONS_ON]}
 
     def changes(self, asset: AssetRecord) -> str | None:
         """Returns why the asset has to be imported again, as the end of the sentence "imported again because …"; None when it is up to date."""

@@ -95,7 +95,8 @@ def import_file(
     try:
         with _checkpoints(record, source, final, inputs, ground) as checkpoints:
             with parser or ParserProcess() as running:
-                parse = partial(_parse, record, source, options, draft, checkpoints, progress, running)
+                known = next((asset for asset in catalogue.assets(scene) if asset.name == source.name), None)
+                parse = partial(_parse, record, source, options, inputs.of_last_import(known), draft, checkpoints, progress, running)
                 parsed = parse(entry or find_format(source.format).parser, ground)
             report = parsed["report"]
             if not report["triangles"] and report.get("grids"):
@@ -127,6 +128,7 @@ def _parse(
     record: SceneRecord,
     source: SourceDocument,
     options: ImportOptions,
+    last: Mapping[str, Any],
     draft: Path,
     checkpoints: Path | None,
     progress: OnProgress | None,
@@ -141,7 +143,7 @@ def _parse(
         "name": source.name,
         "format": source.format,
         "folder": str(draft.absolute()),
-        "reader": options.reader_options(source.format, limits) | _folder_options(source),
+        "reader": options.reader_options(source.format, limits) | dict(last) | _folder_options(source),
         "crs": options.crs,
         "placing": options.placing,
         "scene_crs": _crs_text(record.crs),

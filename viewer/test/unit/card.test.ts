@@ -39,6 +39,23 @@ group("a card", () => {
     expect([card(event).title, card(event).note]).toEqual([title, note]);
   });
 
+  test("shows a measure with its unit, which is metres where the data says none", () => {
+    const attributes = {
+      measuredHeight: 30,
+      "measuredHeight/unit": "ft",
+      area: 80.5,
+      "area/unit": "acre",
+      "lost/unit": "kWh",
+      name: "Inn",
+      "name/unit": "x",
+    };
+    const made = card({ name: "b_1", class: "building", attributes });
+    expect(rows(made)["Height"]).toBe("30 ft");
+    const details = Object.fromEntries(made.details);
+    expect(details).toMatchObject({ measuredHeight: "30 ft", area: "80.5 acre", "lost/unit": "kWh", name: "Inn" });
+    expect(Object.keys(details)).not.toContain("area/unit");
+  });
+
   test("says what people want to know in words, and keeps the rest as the data has it", () => {
     const made = card({
       name: "b_1",

@@ -157,6 +157,9 @@ pub struct AssetReport {
     pub crs: Option<String>,
     /// Box of the kept geometry, in the coordinates of mesh.m3a.
     pub box_source: Option<[[f64; 3]; 2]>,
+    /// The day that decided which versions of objects have ended; only where one of them has an end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub versions_on: Option<String>,
 }
 
 /// Files that a finding names.

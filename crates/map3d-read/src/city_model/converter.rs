@@ -156,6 +156,11 @@ impl FeatureConverter {
             let feature = &city_object.features[f];
             let is_within = feature.parent.is_some_and(|p| city_object.features[p as usize].is_left_out);
             let exists = feature.lifespan.exists(self.conversion.date);
+            if let VersionDate::Current(day) = self.conversion.date
+                && feature.lifespan.has_end()
+            {
+                report.set_versions_on(day.to_string());
+            }
             if !exists && !is_within {
                 let object = &city_object.features[city_object.find_object(f as u32) as usize];
                 report.omit_one(self.conversion.date.reason(), &object.name);

@@ -1,5 +1,6 @@
 //! When versions of features begin and end, as CityGML, INSPIRE and national profiles write it, and which of them are converted.
 
+use std::fmt;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use map3d_base::reason::{Message, Reason};
@@ -62,8 +63,14 @@ impl VersionDate {
     pub fn reason(self) -> Message {
         match self {
             Self::Current(_) => Reason::VersionEnded.into(),
-            Self::Requested(Day { year, month, day }) => Reason::VersionOfOtherDate.with("date", format!("{year:04}-{month:02}-{day:02}")),
+            Self::Requested(day) => Reason::VersionOfOtherDate.with("date", day.to_string()),
         }
+    }
+}
+
+impl fmt::Display for Day {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{:04}-{:02}-{:02}", self.year, self.month, self.day)
     }
 }
 
@@ -90,6 +97,10 @@ impl Lifespan {
             }
             _ => {}
         }
+    }
+
+    pub fn has_end(&self) -> bool {
+        self.end.is_some()
     }
 
     pub fn exists(&self, date: VersionDate) -> bool {

@@ -47,6 +47,11 @@ impl ReportBuilder {
         self.report.crs = crs;
     }
 
+    /// Notes the day that decides which versions have ended.
+    pub fn set_versions_on(&mut self, day: String) {
+        self.report.versions_on = Some(day);
+    }
+
     /// Counts a broken part that is left out. `location` describes where it is; the report keeps the first.
     pub fn skip(&mut self, reason: impl Into<Message>, location: impl FnOnce() -> String) -> Result<()> {
         self.skip_many(reason, 1, location)

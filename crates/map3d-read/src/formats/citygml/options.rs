@@ -18,6 +18,8 @@ pub struct CityGmlOptions {
     pub interiors: bool,
     /// Converts the versions of features that exist on this day; by default, those that have not ended.
     pub at: Option<String>,
+    /// The day that decides which versions have ended; by default, the present one.
+    pub versions_on: Option<String>,
     /// Other files in the folder of the document whose appearances target surfaces of it.
     pub appearance_files: Vec<PathBuf>,
 }
@@ -25,9 +27,13 @@ pub struct CityGmlOptions {
 impl CityGmlOptions {
     /// Returns the date whose versions are converted.
     pub fn parse_date(&self) -> Result<VersionDate> {
-        let Some(text) = &self.at else { return Ok(VersionDate::today()) };
-        let day = Day::parse(text).ok_or_else(|| Error::argument(format!("at {text:?}: expected a date such as 2026-11-27")))?;
-        Ok(VersionDate::Requested(day))
+        let parse =
+            |name: &str, text: &str| Day::parse(text).ok_or_else(|| Error::argument(format!("{name} {text:?}: expected a date such as 2026-11-27")));
+        Ok(match (&self.at, &self.versions_on) {
+            (Some(text), _) => VersionDate::Requested(parse("at", text)?),
+            (None, Some(text)) => VersionDate::Current(parse("versions_on", text)?),
+            (None, None) => VersionDate::today(),
+        })
     }
 
     /// Returns the requested level of detail.
