@@ -60,6 +60,13 @@ def test_most_objects_are_right_and_so_is_who_fits_the_terrain() -> None:
     assert of_files(row[0][-4:], row[1]) == [(0, 1, "heights-below-terrain", -500)]
 
 
+def test_a_file_that_touches_wrong_ones_alone_is_named_for_its_own_fault() -> None:
+    row = [beside("a", tiles=0), beside("b", tiles=1, factor=1 / 0.3048), beside("c", tiles=2, base=0.0), beside("e", tiles=-1)]
+    assert [(file, kind) for file, _, kind, _ in of_files(*row)] == [(1, "heights-in-feet"), (2, "heights-at-zero")]
+    row[2] = beside("c", tiles=2, factor=1 / 0.3048)
+    assert [(file, kind) for file, _, kind, _ in of_files(*row)] == [(1, "heights-in-feet"), (2, "heights-in-feet")]
+
+
 def test_single_objects_contradict_several_others_if_they_are_far_off() -> None:
     assert of_files(beside("a", tiles=0), beside("b", tiles=1, above=80.0)[:2]) == []
     assert of_files(beside("a", tiles=0), beside("b", tiles=1, above=500.0)[:2]) == [(1, 0, "heights-above-terrain", 498)]

@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import rasterio
 from pyproj import CRS, Transformer
 
 from tests.coherence.documents import EAST, NORTH, STEP_M, UTM, town, write_dem, write_flat, write_houses, write_photo
@@ -13,7 +14,10 @@ from tests.odd_cities.contradictions import Row
 _TO_DEGREES = Transformer.from_crs(UTM, "EPSG:4326", always_xy=True)
 TOWN = _TO_DEGREES.transform(EAST + 65.0, NORTH + 64.0)
 TILES = _TO_DEGREES.transform(EAST + 65.0, NORTH + 124.0)
-"""Longitude and latitude of the middle of the town, of two towns, and of the terrain below them."""
+WITHOUT_WEST = _TO_DEGREES.transform(EAST + 150.0, NORTH + 100.0)
+"""Longitude and latitude of the middle of the town, of two towns, and of the terrain below them, whole and without its west."""
+VOIDS = ("grid-points-without-height", "heights-void-value")
+VOIDS_OF_TWO = (*VOIDS, "raster-under-others")
 TERRAIN = _TO_DEGREES.transform(EAST + 100.0, NORTH + 100.0)
 
 
@@ -36,6 +40,17 @@ def _model(folder: Path) -> None:
     faces = ["f 4 3 2 1", "f 5 6 7 8", *(f"f {k + 1} {(k + 1) % 4 + 1} {(k + 1) % 4 + 5} {k + 5}" for k in range(4))]
     (folder / "model.obj").write_text("\n".join([*(f"v {x} {y} {z}" for x, y, z in corners), *faces]))
     (folder / "model.prj").write_text(CRS(UTM).to_wkt("WKT1_ESRI"))
+
+
+def _voids(folder: Path, value: float, files: int = 1) -> None:
+    """Writes a town and elevation models, whose westernmost 100 m have a value that means no height and is not declared."""
+    write_houses(folder / "town.gml", town())
+    for number in range(files):
+        path = write_dem(folder / f"dem{number}.tif", 0.001 * number)
+        with rasterio.open(path, "r+") as dem:
+            heights = dem.read()
+            heights[:, :, :20] = value
+            dem.write(heights)
 
 
 def _with(write: Callable[[Path], object], folder: Path) -> None:
@@ -78,6 +93,16 @@ HEIGHT: list[Row] = [
     Row("a town on the ellipsoid", partial(_on_terrain, above=46.5), TERRAIN, (*TERRAIN_M, 66.4), 17, ("heights-ellipsoidal",), textures=1),
     Row("heights in feet", partial(_on_terrain, factor=1 / 0.3048), TERRAIN, (*TERRAIN_M, 1205.9), 17, ("heights-in-feet",), textures=1),
     Row("the same, read so", partial(_on_terrain, factor=1 / 0.3048), TERRAIN, (*TERRAIN_M, 19.9), 17, (), {"height_unit": "ft"}, textures=1),
+    Row("gaps that are 0", partial(_voids, value=0.0), WITHOUT_WEST, (300.0, 400.0, 14.9), 17, VOIDS, textures=1),
+    Row(
+        "gaps that are -9999 in two models",
+        partial(_voids, value=-9999.0, files=2),
+        WITHOUT_WEST,
+        (300.0, 400.0, 14.9),
+        17,
+        VOIDS_OF_TWO,
+        textures=1,
+    ),
     Row("one house 520 m below the others", _stray, TOWN, (130.0, 128.0, 529.0), 16, ("objects-off-ground",)),
     Row("a tile 500 m below the one beside it", partial(_tiles, above=-500.0), TILES, (*TILES_M, 515.0), 25, ("heights-unlike-file",)),
     Row("the same tile, moved", partial(_tiles, above=-500.0), TILES, (*TILES_M, 15.0), 25, ("heights-moved",), {"heights": "500"}),

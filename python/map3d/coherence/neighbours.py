@@ -94,17 +94,24 @@ def _of_group(
     right_m = _right_level(files, offsets)
     wrong = [number for number, metres in offsets.items() if not _is_same(metres, right_m)]
     right = [number for number in offsets if number not in wrong]
-    of_wrong = {number: _kind(files, pairs, number, right, geoid) for number in wrong}
-    known = {kind for kind in of_wrong.values() if kind is not None}
+    kinds = {number: _kind(files, pairs, number, right, geoid) for number in wrong}
+    known = {kind for kind in kinds.values() if kind is not None}
     if known and known <= set(GROUND_KINDS) and not any(files[number].is_right for number in right):
         wrong, right = right, wrong
-        of_wrong = {number: _kind(files, pairs, number, right, geoid) for number in wrong}
+        kinds = {number: _kind(files, pairs, number, right, geoid) for number in wrong}
         right_m = float(np.median([offsets[number] for number in right]))
-        known = {kind for kind in of_wrong.values() if kind is not None}
     for number in wrong:
         metres = offsets[number] - right_m
-        kind = of_wrong[number] or min(known, default="heights-below-terrain" if metres < 0 else "heights-above-terrain")
+        alike = (kind for other, kind in kinds.items() if kind is not None and _is_same(offsets[other] - right_m, metres))
+        kind = kinds[number] or next(alike, None) or _kind_of_distance(files[number].bases[:, 2], metres)
         yield FileDifference(number, _beside(pairs, number, right), kind, metres)
+
+
+def _kind_of_distance(base: Floats, metres: float) -> str:
+    """Returns the kind of a file that touches no right one."""
+    if are_zero(base):
+        return "heights-at-zero"
+    return "heights-below-terrain" if metres < 0 else "heights-above-terrain"
 
 
 def _right_level(files: Sequence[FileBases], offsets: Mapping[int, float]) -> float:

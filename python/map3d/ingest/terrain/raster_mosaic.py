@@ -25,6 +25,7 @@ from rasterio.windows import Window
 from map3d.errors import ImportFailed, LimitExceeded
 from map3d.geometry.crs import horizontal_crs
 from map3d.ingest.terrain.damaged_reads import Damage
+from map3d.ingest.terrain.height_voids import HeightVoids
 from map3d.ingest.terrain.orthophoto import Colours, Mask, Orthophoto
 from map3d.ingest.terrain.photo_margin import PhotoMargins
 from map3d.ingest.terrain.photo_values import ValueRange, find_colour_bands, find_range, is_whole, sample_values, significant_bits
@@ -89,6 +90,7 @@ class RasterMosaic:
         """
         self._stated, self._ranks = stated_crs, ranks or {}
         self._opened: OrderedDict[Path, tuple[Any, Any]] = OrderedDict()
+        self.voids = HeightVoids()
         self.crs = next((crs for crs in map(self._own_crs, paths) if crs is not None), None)
         self._dates = _dates(paths)
         grids = [self._grid_of(path) for path in paths]
@@ -196,6 +198,7 @@ class RasterMosaic:
     def _resampled(self, source: Any, part: MosaicPart) -> WarpedVRT:
         own, target = self._own_crs(part.path) or self.crs, self.crs
         is_image = source.dtypes[0] == "uint8" or source.count in (3, 4)
+        void = None if is_image else self.voids.of(part.path, source)
         has_mask = source.nodata is not None or any(MaskFlags.all_valid not in flags for flags in source.mask_flag_enums)
         return WarpedVRT(
             source,
@@ -205,6 +208,7 @@ class RasterMosaic:
             width=part.width,
             height=part.height,
             resampling=Resampling.nearest if source.colorinterp[0] is ColorInterp.palette else Resampling.bilinear,
+            **({} if void is None else {"src_nodata": void}),
             **(({} if has_mask else {"add_alpha": True}) if is_image else {"dtype": "float64", "nodata": math.nan}),
         )
 
@@ -222,7 +226,9 @@ class MosaicHeightField(RasterHeightField):
     def _read_window(self, window: Window) -> NDArray[np.float64]:
         data = np.full((window.height, window.width), np.nan)
         for piece in self._mosaic.windows(window):
-            heights, implausible = read_metres(piece.dataset, piece.window, self._scale_of(piece.part), self._damage, str(piece.part.path))
+            # A resampled part has none of its void values any more.
+            void = self._mosaic.voids.of(piece.part.path, self._mosaic.source(piece.part)) if piece.part.on_grid else None
+            heights, implausible = read_metres(piece.dataset, piece.window, self._scale_of(piece.part), self._damage, str(piece.part.path), void)
             self.implausible += implausible
             known = np.isfinite(heights)
             data[piece.rows, piece.columns][known] = heights[known]

@@ -15,6 +15,7 @@ from map3d.ingest.exactness import transformation_findings
 from map3d.ingest.findings import finding
 from map3d.ingest.terrain.damaged_reads import Damage
 from map3d.ingest.terrain.ground_heights import GroundHeightField
+from map3d.ingest.terrain.height_voids import HeightVoids
 from map3d.ingest.terrain.orthophoto import ALIGN_PX, MARGIN_PX, Orthophoto
 from map3d.ingest.terrain.photo_margin import PhotoMargin, PhotoMargins
 from map3d.ingest.terrain.photo_values import ValueRange
@@ -50,7 +51,7 @@ class TerrainRasters:
         self._opened = ExitStack()
         try:
             dem = _open(dems, options, MAX_TRIANGLES / 2 if options.max_error_m == 0 else None) if dems else None
-            self._margins = PhotoMargins()
+            self._margins, self._voids = PhotoMargins(), HeightVoids()
             self._open_all(dem, _open(orthos, options) if orthos else None, scene_crs, options, None)
         except BaseException:
             self._opened.close()
@@ -59,7 +60,7 @@ class TerrainRasters:
     def reopen(self) -> Self:
         """Returns the same rasters for another thread."""
         other = object.__new__(type(self))
-        other._opened, other._margins = ExitStack(), self._margins
+        other._opened, other._margins, other._voids = ExitStack(), self._margins, self._voids
         value_range = None if self.photo is None else self.photo.value_range
         dem, ortho = (None if raster is None else _reopen(raster) for raster in (self.dem, self.ortho))
         other._open_all(dem, ortho, self._scene_crs, self._options, value_range)
@@ -138,12 +139,23 @@ class TerrainRasters:
         unknown = [unit for unit in map(self._unknown_unit, _datasets(self.dem)) if unit]
         if unknown:
             found.append(finding("height-unit-unknown", len(unknown), unknown[0]))
+        voids = [(Path(name).name, value) for name, value in self._void_values() if value is not None]
+        if voids:
+            found.append(finding("heights-void-value", len(voids), f"{voids[0][0]}: {voids[0][1]:g}"))
         if isinstance(self.height_field, GroundHeightField):
             found.append(finding("photo-draped-on-bases", len(list(_datasets(self.ortho))), Path(self.base.name).name))
         if self._scene_crs is not None and self._options.crs is None:
             missing = [raster for raster in (self.dem, self.ortho) if raster is not None and raster.crs is None]
             found += [finding("raster-crs-assumed", 1, Path(raster.name).name) for raster in missing]
         return found
+
+    def _void_values(self) -> Iterator[tuple[str, float | None]]:
+        """Yields each elevation model with the value that means no height, though it does not declare it."""
+        if isinstance(self.dem, RasterMosaic):
+            for part in self.dem.parts:
+                yield str(part.path), self.dem.voids.of(part.path, self.dem.source(part))
+        elif self.dem is not None:
+            yield str(self.dem.name), self._voids.of(Path(self.dem.name), self.dem)
 
     def exactness(self) -> list[dict[str, Any]]:
         """Returns how exactly the rasters are transformed, as findings of a report."""
@@ -211,7 +223,7 @@ class TerrainRasters:
             return ConstantHeightField(self._options.height_m)
         if isinstance(dem, RasterMosaic):
             return MosaicHeightField(dem, self._height_unit_m, self.damage)
-        return RasterHeightField(dem, self._height_unit_m(dem), damage=self.damage)
+        return RasterHeightField(dem, self._height_unit_m(dem), damage=self.damage, void=self._voids.of(Path(dem.name), dem))
 
     def _height_unit_m(self, dem: Any) -> float:
         if self._options.height_unit_m is not None:

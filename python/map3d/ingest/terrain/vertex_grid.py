@@ -92,10 +92,17 @@ class ConstantHeightField:
 class RasterHeightField:
     """Heights of a raster's first band: bilinear between pixel centres, constant from the outermost centres to the edge. Reads windows only."""
 
-    def __init__(self, dataset: Any, metres_per_unit: float, scale: tuple[float, float] | None = None, damage: Damage | None = None) -> None:
+    def __init__(
+        self,
+        dataset: Any,
+        metres_per_unit: float,
+        scale: tuple[float, float] | None = None,
+        damage: Damage | None = None,
+        void: float | None = None,
+    ) -> None:
         """`scale`: metres per value and metres of the value 0; None takes them from the dataset. `damage` gets the name of a raster that cannot
-        be read as a whole."""
-        self._dataset, self._damage = dataset, damage or Damage(strict=True)
+        be read as a whole; `void`: the value that means no height, besides declared ones."""
+        self._dataset, self._damage, self._void = dataset, damage or Damage(strict=True), void
         self._scale = scale or (float(dataset.scales[0]) * metres_per_unit, float(dataset.offsets[0]) * metres_per_unit)
         self.implausible = 0
         """Number of heights beyond ±100 km, counted once per tile."""
@@ -117,20 +124,23 @@ class RasterHeightField:
 
     def _read_window(self, window: Window) -> NDArray[np.float64]:
         """Returns metres; NaN in gaps."""
-        data, implausible = read_metres(self._dataset, window, self._scale, self._damage, str(self._dataset.name))
+        data, implausible = read_metres(self._dataset, window, self._scale, self._damage, str(self._dataset.name), self._void)
         self.implausible += implausible
         return data
 
 
-def read_metres(dataset: Any, window: Window, scale: tuple[float, float], damage: Damage, name: str) -> tuple[NDArray[np.float64], int]:
-    """Returns the heights of a window in metres, NaN in gaps and where the raster `name` cannot be read, and the number of implausible ones."""
+def read_metres(
+    dataset: Any, window: Window, scale: tuple[float, float], damage: Damage, name: str, void: float | None = None
+) -> tuple[NDArray[np.float64], int]:
+    """Returns the heights of a window in metres, NaN in gaps, at the value `void` and where the raster `name` cannot be read, and the number of
+    implausible ones."""
     data = np.full((int(window.height), int(window.width)), np.nan)
 
     def read(part: Window, _rows: int) -> Any:
         return read_checked(dataset, 1, window=part, masked=True)
 
     for rows, band in read_parts(window, int(window.height), dataset.block_shapes[0][0], read, partial(damage.add, name)):
-        data[rows] = np.where(np.ma.getmaskarray(band), np.nan, band.data.astype(np.float64) * scale[0] + scale[1])
+        data[rows] = np.where(np.ma.getmaskarray(band) | (band.data == void), np.nan, band.data.astype(np.float64) * scale[0] + scale[1])
     with np.errstate(invalid="ignore"):
         implausible = np.abs(data) > MAX_HEIGHT_M
     data[implausible | ~np.isfinite(data)] = np.nan
