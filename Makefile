@@ -13,7 +13,7 @@ CACHE := .cache
 RUST := $(shell find crates -name '*.rs' -o -name Cargo.toml) Cargo.toml Cargo.lock
 VIEWER := $(shell find viewer/src viewer/page viewer/scripts -type f 2>/dev/null) $(wildcard viewer/*.json viewer/*.ts viewer/*.js viewer/*.mjs)
 
-.PHONY: help demo test test-all test-rust test-python mongo-server test-viewer test-wheel test-browser test-browsers browser-suite test-more test-more-python wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer bench-serve peers faults bless docs reference build clean tools
+.PHONY: help demo test test-all test-rust test-python mongo-server test-viewer test-wheel test-browser test-browsers browser-suite test-more test-more-python wheel check check-words check-rust check-python check-viewer bench bench-extent bench-cycles bench-rotterdam bench-viewer bench-serve peers faults bless docs reference build test-build clean tools
 
 help: ## list the targets
 	@echo "map3d: 3D city models as oblique image tiles"; echo
@@ -41,6 +41,15 @@ $(CACHE)/core: $(RUST) pyproject.toml $(CACHE)/venv
 	$(BIN)/maturin develop --release --locked -q
 	@touch $@
 
+CARGO_TEST := PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo test --workspace --tests --locked
+TEST_CORE := $(CACHE)/$(if $(wildcard $(CACHE)/core),core,checked-core)
+
+# The core in the profile of the Rust tests, which compiles their parts once and checks overflows and assertions. A core that is in use is tested as it is.
+$(CACHE)/checked-core: $(RUST) pyproject.toml $(CACHE)/venv
+	$(CARGO_TEST) -q --no-run
+	$(BIN)/maturin develop --locked -q
+	@touch $@
+
 $(CACHE)/npm: viewer/package-lock.json | $(CACHE)
 	cd viewer && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
 	@touch $@
@@ -55,7 +64,9 @@ $(CACHE):
 
 build: $(CACHE)/core $(CACHE)/viewer ## compile the core and the viewer into .venv
 
-wheel: build ## build dist/map3d-*.whl: abi3, manylinux, with the viewer inside
+test-build: $(TEST_CORE) $(CACHE)/viewer
+
+wheel: $(CACHE)/viewer ## build dist/map3d-*.whl: abi3, manylinux, with the viewer inside
 	rm -f dist/map3d-*.whl
 	$(BIN)/maturin build --release --locked -q -o dist
 	@ls -sh dist/map3d-*.whl
@@ -67,19 +78,21 @@ demo: build ## generate a town, render it, serve it on a free port and print the
 
 # -- test ----------------------------------------------------------------------------------------------------------------------------
 
-test: test-rust test-python test-viewer test-browser ## run the tests that guard map3d's own laws, including those in a browser
+test: ## run the tests that guard map3d's own laws, including those in a browser
+	@$(MAKE) --no-print-directory -j 3 test-build mongo-server
+	@$(MAKE) --no-print-directory test-rust test-python test-viewer test-browser
 
-test-browsers: build ## test the viewer in Firefox and WebKitGTK, and with bundlers; skips browsers that are not installed, and says so
+test-browsers: test-build ## test the viewer in Firefox and WebKitGTK, and with bundlers; skips browsers that are not installed, and says so
 	@status=0; tests/browsers.sh all || status=$$?; \
 	case $$status in 0) cd viewer && npx --no-install vitest run --config vitest.agreement.config.ts;; 3) ;; *) exit $$status;; esac
 
-test-rust:
-	cargo test --workspace --locked --exclude map3d-py --lib --tests -q
+test-rust: $(CACHE)/venv
+	$(CARGO_TEST) -q
 
 # Two files at a time; tests/conftest.py names those that never run at the same time.
 PYTEST := $(BIN)/python -m pytest -q -n 2 --dist loadgroup
 
-test-python: build mongo-server
+test-python: test-build mongo-server
 	$(PYTEST) -m "not browser and not wheel and not third_party and not endurance"
 
 MONGO := tests/catalogue/mongo_server
@@ -95,11 +108,11 @@ test-viewer: $(CACHE)/npm
 test-wheel: wheel ## install the wheel into an empty environment without Rust and Node.js, and run it
 	$(BIN)/python -m pytest -q -m wheel
 
-test-browser: build ## test in Chromium; skips the tests if it is not installed, and says so
+test-browser: test-build ## test in Chromium; skips the tests if it is not installed, and says so
 	@status=0; tests/browsers.sh || status=$$?; \
 	case $$status in 0) $(MAKE) --no-print-directory browser-suite;; 3) ;; *) exit $$status;; esac
 
-browser-suite: build
+browser-suite: test-build
 	cd viewer && npx --no-install vitest run --config vitest.browser.config.ts
 	$(BIN)/python -m pytest -q -m browser
 
@@ -107,15 +120,15 @@ test-all: test test-more ## run all tests: also agreement with programs of other
 
 test-more: test-more-python test-browsers test-wheel # what test-all runs beyond test
 
-test-more-python: build mongo-server
+test-more-python: test-build mongo-server
 	$(PYTEST) -m "(third_party or endurance) and not browser"
 
-faults: build ## kill, fill disks, fail system calls: every tile set must equal the undisturbed one (docs/reliability.md): 2 hours
+faults: test-build ## kill, fill disks, fail system calls: every tile set must equal the undisturbed one (docs/reliability.md): 2 hours
 	$(BIN)/python -m tests.faults
 
 # -- check ---------------------------------------------------------------------------------------------------------------------------
 
-check: build ## check words, format, lint, types and sizes, two parts at a time
+check: $(CACHE)/venv $(CACHE)/viewer ## check words, format, lint, types and sizes, two parts at a time
 	@$(MAKE) --no-print-directory -j 2 --output-sync=target check-rust check-python check-viewer check-words
 
 check-words: $(CACHE)/venv
@@ -125,11 +138,11 @@ check-rust: $(CACHE)/venv
 	cargo fmt --all --check
 	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets --locked -q -- -D warnings
 
-check-python: build
+check-python: $(CACHE)/venv
 	$(BIN)/ruff check python tests spec bench docs
 	$(BIN)/ruff format --check python tests spec bench docs
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	PYTHONPATH=python $(BIN)/lint-imports
 
 check-viewer: $(CACHE)/viewer
 	cd viewer && npm run --silent lint && npm run --silent typecheck && npm run --silent size && npm run --silent docs:check

@@ -1,8 +1,7 @@
 import { defineConfig } from "vitest/config";
 
-/** Files of a worker share one browser and rendered fixtures (`isolate: false`). A second attempt goes when ten runs beside a load have passed without one. */
+/** Files of a worker share one browser and rendered fixtures (`isolate: false`). */
 export const BROWSER_TESTS = {
-  retry: 1,
   environment: "node",
   isolate: false,
   maxWorkers: 2,
