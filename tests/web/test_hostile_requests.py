@@ -121,27 +121,21 @@ def test_a_title_of_five_megabytes_is_cut(client, workspace, tmp_path, monkeypat
     assert f"<title>{'x' * (MAX_TITLE - 1)}…</title>" in page
 
 
-def test_the_health_check_fails_when_the_workspace_is_gone(client, workspace):
-    assert client.get("/healthz").status_code == 200
-    shutil.rmtree(workspace.root)
-    response = client.get("/healthz")
-    assert (response.status_code, response.headers["cache-control"]) == (503, "no-store")
-
-
-def test_the_health_check_fails_when_the_catalogue_is_gone(client, workspace):
-    assert client.get("/healthz").status_code == 200
+def test_the_server_is_not_ready_when_the_catalogue_is_gone(client, workspace):
+    assert client.get("/readyz").status_code == 200
     workspace.catalogue_path.unlink()
-    assert client.get("/healthz").status_code == 503
+    assert client.get("/readyz").status_code == 503
+    assert client.get("/healthz").status_code == 200
 
 
 def test_a_deleted_catalogue_is_not_created_again(client, workspace):
     """Each request may be answered by a thread that opens the catalogue for the first time."""
-    assert client.get("/healthz").status_code == 200
+    assert client.get("/readyz").status_code == 200
     for path in workspace.root.glob("catalogue.sqlite*"):
         path.unlink()
     for _ in range(2 * THREADS):
         assert client.get("/renderings").status_code == 503
-        assert client.get("/healthz").status_code == 503
+        assert client.get("/readyz").status_code == 503
     assert not workspace.catalogue_path.exists()
     with pytest.raises(NotFound, match="restore it from a backup"):
         workspace.open_catalogue()

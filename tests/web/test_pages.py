@@ -32,7 +32,7 @@ def built_viewer(tmp_path, monkeypatch):
 
 
 def test_the_public_routes_are_there(client):
-    assert {"pages.home", "pages.renderings", "pages.view", "pages.icon", "pages.healthz", "documents.manifest", "pages.static"} <= {
+    assert {"pages.home", "pages.renderings", "pages.view", "pages.icon", "documents.manifest", "pages.static"} <= {
         rule.name for rule in client.app.views.rules
     }
 
@@ -319,7 +319,7 @@ def test_the_health_check_answers(client):
 
 def test_an_unexpected_error_is_500_without_details(client, monkeypatch):
     monkeypatch.setattr("map3d.web.pages.page_routes.catalogue", lambda: 1 / 0)
-    response = client.get("/healthz")
+    response = client.get("/renderings")
     assert (response.status_code, response.text) == (500, "internal server error; see the server log\n")
 
 

@@ -18,7 +18,9 @@ import httpx
 import pytest
 
 from map3d.web import create_app
+from map3d.web.http import health
 from map3d.web.http.settings import ServerSettings
+from map3d.web.server import health_route
 from map3d.web.server.metrics import COUNTERS, ROUTES, Metrics, render_metrics
 from map3d.web.server.serve import find_port
 from tests.web.conftest import Client
@@ -86,6 +88,26 @@ def test_a_ready_server_names_its_parts(workspace):
     response = client.get("/readyz")
     assert response.status_code == 503
     assert {name for name, state in response.json().items() if state != "ok"} >= {"workspace", "catalogue"}
+    client.close()
+
+
+def test_a_catalogue_that_hangs_is_named_and_delays_nothing_else(workspace, monkeypatch):
+    """One thread waits for the catalogue, whatever the number of requests."""
+    answers, calls = threading.Event(), []
+
+    def wait(catalogue):
+        calls.append(catalogue)
+        answers.wait(WAIT_S)
+
+    client = Client(create_app(workspace, ServerSettings()))
+    monkeypatch.setattr(health, "_check_catalogue", wait)
+    monkeypatch.setattr(health_route, "READY_S", 0.05)
+    for _ in range(3):
+        assert client.get("/readyz").json() == {"workspace": "ok", "catalogue": "no answer within 0.05 s", "stores": "ok"}
+    assert client.get("/healthz").text == "ok\n"
+    assert len(calls) == 1
+    answers.set()
+    wait_until(lambda: client.get("/readyz").status_code == 200)
     client.close()
 
 
@@ -224,7 +246,7 @@ def test_running_requests_are_answered_after_sigterm(start):
         opened = [stack.enter_context(socket.create_connection((address.host, address.port), timeout=WAIT_S)) for _ in range(20)]
         running = opened[:10]
         for one in running:
-            one.sendall(b"POST /healthz HTTP/1.1\r\nHost: x\r\nContent-Length: 5\r\nExpect: 100-continue\r\n\r\n")
+            one.sendall(b"POST /sign-in HTTP/1.1\r\nHost: x\r\nContent-Length: 5\r\nExpect: 100-continue\r\n\r\n")
         for one in running:
             assert one.recv(65536).startswith(b"HTTP/1.1 100")
         server.signal(signal.SIGTERM)
@@ -232,7 +254,7 @@ def test_running_requests_are_answered_after_sigterm(start):
         for one in running:
             one.sendall(b"12345")
         for one in running:
-            assert one.recv(65536).startswith(b"HTTP/1.1 405"), "the whole request has reached the app"
+            assert one.recv(65536).startswith(b"HTTP/1.1 403"), "the whole request has reached the app"
     assert server.process.wait(WAIT_S) == 0
 
 

@@ -53,6 +53,7 @@ def test_the_environment_is_before_the_file_and_options_are_before_both(config, 
         ("processes", "0", "1 to 64"), ("processes", "65", "1 to 64"), ("on_demand", "maybe", "true or false"), ("log_format", "xml", "text or json"),
         ("on_demand_quota_gb", "0", "greater than 0"), ("on_demand_quota_gb", "NaN", "greater than 0"),
         ("on_demand_quota_gb", "-1", "greater than 0"),
+        ("trusted_proxies", "proxy", "addresses and networks"),
         ("metrics", "9464", "HOST:PORT"), ("metrics", "x:y", "0 to 65535"), ("public_url", "maps.example", "https://example.org/maps"),
     ],
 )  # fmt: skip

@@ -1,10 +1,10 @@
 """The request that the current thread answers, and the site that it belongs to."""
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 from urllib.parse import parse_qsl
@@ -28,7 +28,7 @@ FORM: Final = "application/x-www-form-urlencoded"
 
 @dataclass
 class Site:
-    """What the requests of a process share. Threads may share it. `parts`: further parts of the process, and whether they work."""
+    """What the requests of a process share. Threads may share it."""
 
     catalogue: SharedCatalogue
     settings: ServerSettings
@@ -36,7 +36,6 @@ class Site:
     stores: OpenStores
     views: TiledViews
     previews: PreviewPool
-    parts: Mapping[str, Callable[[], bool]] = field(default_factory=dict)
 
     def close(self) -> None:
         self.previews.close()

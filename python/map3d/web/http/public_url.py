@@ -8,6 +8,7 @@ import re
 from typing import Final
 
 from map3d.web.http.asgi import Scope
+from map3d.web.http.clients import client_scheme
 from map3d.web.http.conditions import header
 from map3d.web.http.current import request, site
 from map3d.web.http.settings import ServerSettings
@@ -29,4 +30,4 @@ def public_url(path: str = "") -> str:
 def root_url(settings: ServerSettings, scope: Scope) -> str:
     """Returns the absolute URL of the server's root for the client of a request."""
     host = header(scope["headers"], b"host").decode("latin-1")
-    return settings.public_url or f"{scope.get('scheme', 'http')}://{host if _HOST.fullmatch(host) else 'localhost'}"
+    return settings.public_url or f"{client_scheme(scope, settings.trusted_proxies)}://{host if _HOST.fullmatch(host) else 'localhost'}"

@@ -6,7 +6,9 @@ from typing import Final, TypeVar
 
 from starlette.responses import Response
 
-from map3d.web.http.guards import check_guarded
+from map3d.catalogue import ROLES, Role
+from map3d.web.http.access import SAFE_METHODS
+from map3d.web.http.guards import GUARD, SIGN_IN, check_guarded
 
 MOST_BYTES: Final = 64 << 10
 """Size of a body, unless the route says otherwise."""
@@ -23,6 +25,16 @@ class Rule:
     path: str
     view: Callable[..., Response]
     most_bytes: int
+
+    @property
+    def reads_body(self) -> bool:
+        return self.method not in SAFE_METHODS
+
+    @property
+    def role(self) -> Role | None:
+        """The role that a caller needs before the body is read; None for the form that signs in."""
+        guard: Role | str = getattr(self.view, GUARD, SIGN_IN)
+        return next((role for role in ROLES if role == guard), None)
 
     @property
     def order(self) -> list[int]:

@@ -8,6 +8,7 @@ from starlette.responses import Response
 from map3d.accounts import Session
 from map3d.accounts.sessions import MAX_AGE_S
 from map3d.web.http.access import COOKIE
+from map3d.web.http.clients import client_scheme
 from map3d.web.http.current import request, site
 
 _SAME_SITE: Final[Any] = "Lax"
@@ -20,7 +21,7 @@ def set_session(response: Response, session: Session) -> None:
         site().access.sessions.dump(session),
         max_age=MAX_AGE_S if session.user else None,
         path=_path(),
-        secure="https" in (request().scope.get("scheme"), urlsplit(site().settings.public_url or "").scheme),
+        secure="https" in (client_scheme(request().scope, site().settings.trusted_proxies), urlsplit(site().settings.public_url or "").scheme),
         httponly=True,
         samesite=_SAME_SITE,
     )

@@ -10,6 +10,7 @@ from urllib.parse import urlsplit
 
 from map3d.errors import BadRequest, NotFound
 from map3d.jobs.on_demand.worker import OnDemandSettings
+from map3d.web.http.clients import THIS_HOST, Network, parse_networks
 
 CONFIG_VARIABLE: Final = "MAP3D_CONFIG"
 PREFIX: Final = "MAP3D_"
@@ -24,6 +25,7 @@ class ServerSettings:
 
     `cache_bytes`: size of the memory cache of tiles in each process. `on_demand`: None if tiles are not rendered when they are asked for. `metrics`:
     host and port that serve Prometheus metrics, None for nowhere. `drain_s`: how long running requests may take after a signal to stop.
+    `trusted_proxies`: those whose X-Forwarded-For names the client, and whose X-Forwarded-Proto its scheme.
     """
 
     public_url: str | None = None
@@ -36,6 +38,7 @@ class ServerSettings:
     access_log: bool = False
     metrics: tuple[str, int] | None = None
     drain_s: int = 30
+    trusted_proxies: tuple[Network, ...] = THIS_HOST
 
 
 @dataclass(frozen=True)
@@ -153,6 +156,10 @@ def _one_of(choices: tuple[str, ...]) -> Callable[[Any], str]:
     return parse
 
 
+def _networks(value: Any) -> tuple[Network, ...]:
+    return parse_networks(", ".join(map(str, value)) if isinstance(value, list) else str(value))
+
+
 def _address(value: Any) -> tuple[str, int]:
     host, _, port = str(value).rpartition(":")
     if not host:
@@ -183,5 +190,11 @@ SETTINGS: Final = (
     Setting("log_format", _one_of(LOG_FORMATS), "text", "text, or json: one JSON object in each line"),
     Setting("access_log", _boolean, "false", "log every request"),
     Setting("metrics", _address, "", "HOST:PORT of the Prometheus metrics, such as 127.0.0.1:9464; without it there are none"),
+    Setting(
+        "trusted_proxies",
+        _networks,
+        "127.0.0.0/8, ::1",
+        "addresses and networks of proxies, whose X-Forwarded-For and X-Forwarded-Proto name the client's address and scheme",
+    ),
     Setting("drain_s", _integer(1, 3600), "30", "seconds that running requests may take after a signal to stop or reload"),
 )

@@ -1,6 +1,5 @@
-"""Pages: the list of renderings, the viewer of one rendering, icons, and the health check."""
+"""Pages: the list of renderings, the viewer of one rendering, and icons."""
 
-import json
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -22,7 +21,6 @@ from map3d.tiles.track_stores import read_manifest, tiles_url
 from map3d.tiles.viewer_files import PAGE, viewer_folder
 from map3d.types import check_name
 from map3d.web.http.current import catalogue, request, site, workspace
-from map3d.web.http.health import check_alive, check_ready
 from map3d.web.http.http_errors import status_of
 from map3d.web.http.public_url import public_url
 from map3d.web.http.responses import compress, document, file_response, redirect, uncached
@@ -115,22 +113,6 @@ def icon() -> Response:
 @pages.get("/static/{file:path}")
 def static(file: str) -> Response:
     return file_response(STATIC, file)
-
-
-@pages.get("/healthz")
-def healthz() -> Response:
-    """Answers 200 while the workspace exists and its catalogue is readable."""
-    check_alive(workspace(), catalogue())
-    return uncached("ok\n", media_type="text/plain")
-
-
-@pages.get("/readyz")
-def readyz() -> Response:
-    """Answers 200 while the server can do its work, else 503; names the parts that cannot."""
-    state = check_ready(workspace(), catalogue(), writes=renders_on_demand())
-    state |= {name: "ok" if is_alive() else "not running" for name, is_alive in site().parts.items()}
-    status = 200 if set(state.values()) == {"ok"} else 503
-    return uncached(json.dumps(state, indent=1) + "\n", status, "application/json")
 
 
 def renders_on_demand() -> bool:

@@ -19,11 +19,13 @@ from map3d.web.api.routes import api
 from map3d.web.http.access import AccessControl
 from map3d.web.http.asgi import EMPTY, Message, Messages, PlainRoute, Receive, Scope, Send
 from map3d.web.http.current import Site
+from map3d.web.http.health import readiness_checks
 from map3d.web.http.settings import ServerSettings, settings_from_environment
 from map3d.web.http.shared_catalogue import SharedCatalogue
 from map3d.web.http.tiled_views import TiledViews
 from map3d.web.pages.page_routes import pages
 from map3d.web.pages.tools import TEMPLATES
+from map3d.web.server.health_route import HealthRoute
 from map3d.web.server.metrics import Metrics
 from map3d.web.server.observer import Observer
 from map3d.web.server.views import Views
@@ -51,19 +53,20 @@ class App:
     def __init__(
         self, workspace: Workspace, settings: ServerSettings, metrics: Metrics | None = None, parts: Mapping[str, Callable[[], bool]] | None = None
     ) -> None:
-        self.observer = Observer(metrics, settings.access_log) if metrics is not None or settings.access_log else None
+        self.observer = Observer(metrics, settings.access_log, settings.trusted_proxies) if metrics is not None or settings.access_log else None
         self.on_demand = None if settings.on_demand is None else OnDemand(workspace, settings.on_demand)
         catalogue = SharedCatalogue(workspace)
         self.tiles = TileRoute(catalogue, settings.cache_bytes, self.on_demand)
         access, tiled = AccessControl(catalogue), TiledViews(catalogue)
         running = dict(parts or {}) | ({} if self.on_demand is None else {"on_demand": self.on_demand.is_alive})
-        self.site = Site(catalogue, settings, access, self.tiles.stores, tiled, PreviewPool(workspace), running)
+        self.health = HealthRoute(readiness_checks(catalogue, writes=self.on_demand is not None), running)
+        self.site = Site(catalogue, settings, access, self.tiles.stores, tiled, PreviewPool(workspace))
         self.views = Views(self.site, chain.from_iterable(ROUTES))
         self.manifests = ManifestRoute(workspace, self.views)
         self.uploads = UploadRoute(workspace, access, lambda: uploads_in_use(catalogue()))
-        self.portrayal = PortrayalRoute(workspace, settings)
+        self.portrayal = PortrayalRoute(workspace, settings, self.views.bodies)
         self.tile_services = TileServiceRoute(self.tiles, tiled)
-        self._plain: tuple[PlainRoute, ...] = (self.tiles, self.uploads, self.portrayal, self.tile_services, self.manifests)
+        self._plain: tuple[PlainRoute, ...] = (self.tiles, self.health, self.uploads, self.portrayal, self.tile_services, self.manifests)
         self._lifespan = Router(lifespan=self._live)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -114,6 +117,7 @@ class App:
         if self.on_demand is not None:
             await loop.run_in_executor(None, self.on_demand.close)
         await self.tile_services.close()
+        self.health.close()
         self.site.close()
 
     @asynccontextmanager

@@ -3,10 +3,11 @@
 import re
 import secrets
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from map3d.web.http.asgi import Application, Receive, Scope, Send
+from map3d.web.http.clients import Network, client_address
 from map3d.web.server.logs import ACCESS
 from map3d.web.server.metrics import ROUTES, Metrics
 
@@ -20,8 +21,9 @@ _TILE, _UPLOAD, _PAGE = range(len(ROUTES))
 class Observer:
     """Counts each request and, with `access_log`, logs it under an id: that of the header X-Request-ID, or a new one, which the answer has, too."""
 
-    def __init__(self, metrics: Metrics | None, access_log: bool) -> None:
-        self.metrics, self.access_log = metrics, access_log
+    def __init__(self, metrics: Metrics | None, access_log: bool, proxies: Sequence[Network]) -> None:
+        """`proxies`: those that name the addresses of clients."""
+        self.metrics, self.access_log, self.proxies = metrics, access_log, proxies
 
     async def __call__(self, answer: Application, scope: Scope, receive: Receive, send: Send) -> None:
         start, seen = time.perf_counter(), [CLIENT_CLOSED, 0]
@@ -45,7 +47,7 @@ class Observer:
             if self.metrics is not None:
                 self.metrics.end(_route_of(scope["path"]), seen[0], seconds)
             if self.access_log:
-                _log(scope, request_id, seen[0], seen[1], seconds)
+                _log(scope, self.proxies, request_id, seen[0], seen[1], seconds)
 
     def count_early(self, scope: Scope, status: int, seconds: float) -> None:
         """Counts a request that was answered at once. Any thread may call it."""
@@ -54,10 +56,15 @@ class Observer:
             self.metrics.end(_route_of(scope["path"]), status, seconds)
 
 
-def _log(scope: Scope, request_id: str, status: int, size: int, seconds: float) -> None:
+def _log(scope: Scope, proxies: Sequence[Network], request_id: str, status: int, size: int, seconds: float) -> None:
     """The query is left out: it may have what people search for, and tokens."""
-    client = scope.get("client") or ("", 0)
-    fields = {"request_id": request_id, "client": client[0], "method": scope["method"], "path": _printable(scope["path"]), "status": status}
+    fields = {
+        "request_id": request_id,
+        "client": client_address(scope, proxies),
+        "method": scope["method"],
+        "path": _printable(scope["path"]),
+        "status": status,
+    }
     ACCESS.info("request", extra={"fields": {**fields, "bytes": size, "ms": round(seconds * 1000, 3)}})
 
 

@@ -16,7 +16,8 @@ from map3d.portrayal.service import PortrayalService, ServiceRequest
 from map3d.portrayal.tracer_pool import SUBPROCESSES, TracerPool
 from map3d.portrayal.xml_requests import MAX_BODY_BYTES
 from map3d.web.http.asgi import Receive, Scope, Send
-from map3d.web.http.bodies import collect
+from map3d.web.http.bodies import Bodies
+from map3d.web.http.clients import client_address
 from map3d.web.http.conditions import etag_matches, header, without_body
 from map3d.web.http.headers import ANY_ORIGIN
 from map3d.web.http.http_errors import not_allowed, plain_error
@@ -47,8 +48,8 @@ def make_pool() -> TracerPool:
 class PortrayalRoute:
     """Belongs to one event loop. Opens the service with the first request."""
 
-    def __init__(self, workspace: Workspace, settings: ServerSettings) -> None:
-        self._workspace, self._settings = workspace, settings
+    def __init__(self, workspace: Workspace, settings: ServerSettings, bodies: Bodies) -> None:
+        self._workspace, self._settings, self._bodies = workspace, settings, bodies
         self._service: PortrayalService | None = None
         self._opening = asyncio.Lock()
 
@@ -73,7 +74,12 @@ class PortrayalRoute:
             return Response(status_code=204, headers={**COMMON, **PREFLIGHT})
         if scope["method"] not in METHODS:
             raise not_allowed(*METHODS)
-        body = await collect(receive, MAX_BODY_BYTES) if scope["method"] == "POST" else None  # the parser refuses one that is too large
+        if scope["method"] != "POST":
+            return await self._ask(scope, None)
+        with self._bodies.hold(client_address(scope, self._settings.trusted_proxies)) as held:
+            return await self._ask(scope, await held.read(scope, receive, MAX_BODY_BYTES))
+
+    async def _ask(self, scope: Scope, body: bytes | None) -> Response:
         service = await self._open()
         endpoint = root_url(self._settings, scope) + scope["path"].rstrip("/")
         request = ServiceRequest(scope["query_string"], body, endpoint, scope["path"] == STRICT_PATH)

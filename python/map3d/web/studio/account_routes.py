@@ -1,6 +1,5 @@
 """Pages of accounts: sign in, sign out, password, tokens."""
 
-import ipaddress
 from urllib.parse import urlsplit
 
 from starlette.responses import Response
@@ -8,6 +7,7 @@ from starlette.responses import Response
 from map3d.catalogue import ROLES, Role
 from map3d.errors import BadRequest, Forbidden, NotFound
 from map3d.web.http.access import check_csrf
+from map3d.web.http.clients import client_address
 from map3d.web.http.current import request, site
 from map3d.web.http.guards import SIGN_IN, mark, require, requires, sent_csrf
 from map3d.web.http.responses import redirect, uncached
@@ -40,7 +40,7 @@ def send_sign_in() -> Response:
     return response
 
 
-accounts.post("/sign-in")(mark(send_sign_in, SIGN_IN))
+accounts.post("/sign-in", most_bytes=4 << 10)(mark(send_sign_in, SIGN_IN))
 
 
 @accounts.post("/sign-out")
@@ -120,10 +120,4 @@ def _own_path(path: str) -> str:
 
 
 def _client_address() -> str:
-    """Returns the client's network address. Trusts the last X-Forwarded-For address if the request comes from this host."""
-    address: str = (request().scope.get("client") or ("",))[0]
-    forwarded = request().headers.get("X-Forwarded-For", "").rpartition(",")[2].strip()
-    try:
-        return str(ipaddress.ip_address(forwarded)) if forwarded and ipaddress.ip_address(address).is_loopback else address
-    except ValueError:
-        return address
+    return client_address(request().scope, site().settings.trusted_proxies)
