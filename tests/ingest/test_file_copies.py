@@ -25,14 +25,16 @@ COPIES = [
 
 
 def found(folder: Path, known: dict[str, Path] | None = None) -> tuple[list[str], dict[str, tuple[str, str]]]:
-    """Returns the names of the files that are read, and of the others the code and the file that each is about."""
+    """Returns the names of the files that are read, and of the others the code and the file that each is about; not of those that only accompany
+    others."""
     notes: dict[str, tuple[str, str]] = {}
 
     def note(path: Path, said: object) -> None:
         notes[path.name] = (said.code, said.values.get("of", ""))  # type: ignore[attr-defined]
 
     sources = find_sources([folder], on_note=note, on_unreadable=note, known=known)
-    return sorted(path.name for source in sources for path in source.paths), notes
+    read = sorted(path.name for source in sources for path in source.paths)
+    return read, {name: said for name, said in notes.items() if said[0] != "used-beside"}
 
 
 def town(folder: Path, name: str = "town.gml", lon: float = MUNICH[0]) -> Path:

@@ -76,7 +76,8 @@ def add(tmp_path: Path, *paths: Path, **options: object) -> tuple[FilesImport, W
 
 
 def notes(done: FilesImport | ImportSummary) -> dict[str, str]:
-    return {Path(file).name: f"{note.code}: {note.values.get('of')}" for file, note in done.ignored}
+    """Returns file → what is said of it, without files that only accompany others."""
+    return {Path(file).name: f"{note.code}: {note.values.get('of')}" for file, note in done.ignored if note.code != "used-beside"}
 
 
 @pytest.mark.parametrize(("image", "world"), [("ortho.jpg", ".jgw"), ("ortho.png", ".pgw"), ("ortho.tif", ".tfw")])

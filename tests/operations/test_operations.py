@@ -32,7 +32,7 @@ def test_zip_with_textures_is_imported_built_rendered_published_and_removed(scen
     assert list(scenario.workspace.asset_folder("town", "textured").glob("textures/*.png")), "the texture was found beside its document"
     assert (scenario.workspace.root / "published" / "town" / "index.html").is_file()
     imported = scenario.catalogue.operations()[-1]
-    assert imported.message == message("imported", files=4, unchanged=0)
+    assert imported.message == message("imported-of-files", files=4, unchanged=0, used=2, ignored=0)
     assert "house-1: 1 object, 12 triangles" in scenario.log(imported)
     removed = scenario.do("remove", what="files", names=["house-1"])
     assert (removed.state, removed.message) == (DONE, message("files-removed", files=1, scene="town"))

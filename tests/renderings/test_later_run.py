@@ -21,7 +21,7 @@ from map3d.types import ViewAngles
 from tests.web.workspaces import make_workspace
 
 EVERY_RUN = {"folder", "out", "replace", "name", "strict", "allow_empty"}
-"""Fields that each run obeys anew, besides those of imports, of what the build keeps, and of the limits of the work."""
+"""Fields that each run follows again, besides those of imports, of what the build keeps, and of the limits of the work."""
 VIEWS = (ViewAngles(0, 45), ViewAngles(45, 22.5))
 
 

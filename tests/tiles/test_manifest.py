@@ -154,7 +154,8 @@ def test_data_tiles_are_the_format_of_the_data_layer_alone(manifest, kind, forma
 def test_the_schema_lists_every_member(manifest, added):
     archives = {view.frame.id: {"color": f"{view.frame.id}/color.pmtiles"} for view in manifest.views}
     shown = tuple(replace(view, thumbnail=THUMBNAIL) for view in added.views)
-    described = replace(added, geographic=GEOGRAPHIC, views=shown, description="Tea", start_view="45-22.5")
+    opening = {"start_view": "45-22.5", "start_radius_m": 80.0, "objects_box": added.box}
+    described = replace(added, geographic=GEOGRAPHIC, views=shown, description="Tea", **opening)
     value = described.with_archives(archives, 7, 1 << 20).to_json()
     schema = SCHEMA["properties"]
     assert set(schema) == set(value) == {*SCHEMA["required"], "geographic", "archive_part_bytes", "description"}

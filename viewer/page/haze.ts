@@ -1,5 +1,5 @@
 import type { ImageLayer, Map3D, View } from "./map3d.module.js";
-import { computeHaze } from "./hazeMask";
+import { clearBox, computeHaze } from "./hazeMask";
 
 /** Pixels of the mask along each side; it covers the square of a view. */
 const SIDE_PX = 128;
@@ -94,10 +94,13 @@ export class Haze {
     context.drawImage(bitmap, 0, 0, SIDE_PX, SIDE_PX);
     bitmap.close();
     const { data: pixels } = context.getImageData(0, 0, SIDE_PX, SIDE_PX);
-    return computeHaze(
+    const haze = computeHaze(
       Uint8Array.from({ length: SIDE_PX * SIDE_PX }, (_, k) => ((pixels[4 * k + 3] ?? 0) > 127 ? 1 : 0)),
       SIDE_PX,
     );
+    const box = this.#layer.rendering?.json.objects?.box;
+    if (haze && box) clearBox(haze, SIDE_PX, view.frame, box);
+    return haze;
   }
 
   /** Colours background and haze: the page's paper in the light of the sky. High contrast keeps its own colours. */

@@ -1,3 +1,6 @@
+import { dot, type Box3, type Vec2, type Vec3 } from "../src/core/vec";
+import type { Frame } from "../src/geo/frame";
+
 /** Width of the haze as a share of the greatest distance from the edge, and as a share of the side at most. */
 const [WIDTH, MAX_WIDTH] = [0.22, 0.05];
 /** Content that is narrower than this share of the side, such as buildings without ground, has no haze. */
@@ -18,6 +21,33 @@ export function computeHaze(inside: Uint8Array, side: number): Uint8ClampedArray
   });
   clearTowers(haze, outside, side, 2 * Math.ceil(width) + 1);
   return haze;
+}
+
+/** Clears the haze over a local box, so that it veils no object in it. */
+export function clearBox(
+  haze: Uint8ClampedArray,
+  side: number,
+  { axes, u0, v0, size }: Pick<Frame, "axes" | "u0" | "v0" | "size">,
+  box: Box3,
+): void {
+  const { right, up } = axes;
+  const corners = Array.from({ length: 8 }, (_, k) => [0, 1, 2].map((axis) => box[((k >> axis) & 1) as 0][axis as 0]) as unknown as Vec3);
+  // The picture of a box is where the pictures of its three edges bound it.
+  const bounds = [0, 1, 2].map((axis) => {
+    const normal: Vec2 = [-up[axis as 0], right[axis as 0]];
+    const at = corners.map((corner) => normal[0] * dot(right, corner) + normal[1] * dot(up, corner));
+    return [normal, Math.min(...at), Math.max(...at)] as const;
+  });
+  // The mask is enlarged smoothly: a pixel more on each side.
+  const px = size / side;
+  const isInside = (u: number, v: number): boolean =>
+    bounds.every(([[a, b], low, high]) => {
+      const margin = px * (Math.abs(a) + Math.abs(b));
+      return a * u + b * v >= low - margin && a * u + b * v <= high + margin;
+    });
+  haze.forEach((_, k) => {
+    if (isInside(u0 + ((k % side) + 0.5) * px, v0 - (Math.floor(k / side) + 0.5) * px)) haze[k] = 0;
+  });
 }
 
 /** Clears the haze over towers: what rises steeply above the upper edge of the content and is narrower than `window` pixels, with the edge at its foot and a pixel on each side. Corners are no towers: at most one of their sides is steep. */

@@ -47,7 +47,9 @@ def command(workspace: Workspace, scene: str, files: Sequence[Path], request: Ad
         place = place_line(workspace, catalogue, scene)
     done, failed = result.imported, result.failed
     if as_json:
-        print_json({"imported": done, "failed": [{"source": path, **reason.named("error")} for path, reason in failed]})
+        failures = [{"source": path, **reason.named("error")} for path, reason in failed]
+        others = [{"source": path, **note.named("reason")} for path, note in result.ignored]
+        print_json({"imported": done, "failed": failures, "ignored": others})
     else:
         _print(place, scene, done, failed, result.ignored)
     exit_for_files(len(failed), (found for item in done for found in findings(item.report)))

@@ -26,7 +26,7 @@ Points = NDArray[np.float64]
 NEAR_TOWN_KM: Final = 100.0
 FAR_FROM_TOWN_KM: Final = 40.0
 TIMES_NEARER: Final = 4.0
-"""An order of axes is assumed without other evidence if it leads to a town of the table and the other one leads this many times farther."""
+"""An order of axes is assumed without other evidence if it leads to a town and the other one leads this many times farther."""
 
 MAX_EXTENT_DEG: Final = 5.0
 LOCAL_M: Final = 100_000.0
@@ -49,7 +49,7 @@ _WORDS: Final = {
 
 @dataclass(frozen=True)
 class AxisDecision:
-    """`by`: the file itself or the user, the other files or the scene, a town of the table, or the form of the name alone. `places`: longitude and
+    """`by`: the file itself or the user, the other files or the scene, a town, or the form of the name alone. `places`: longitude and
     latitude of the middle by order, None if not on Earth."""
 
     axes: Axes

@@ -10,12 +10,13 @@ from map3d.quantities import names_text
 FileNote = tuple[str, Message]
 """(file, what it is)."""
 
-_USED: Final = ("used-as-texture", "used-as-geometry", "used-as-code-list", "used-as-appearance", "used-as-place")
+_USED: Final = ("used-as-texture", "used-as-geometry", "used-as-code-list", "used-as-appearance", "used-as-place", "used-beside")
+_NO_CONTENT: Final = ("without-city-data", "not-used", "left-hidden", "left-own-folder")
 _LEFT_OUT: Final = ("left-same-content", "left-backup", "left-link", "left-archive-without-files")
 _LINES: Final[Mapping[str, str]] = {
     "heights-alone": "files-read-as-terrain",
     **dict.fromkeys(_USED, "files-used"),
-    **dict.fromkeys(_LEFT_OUT, "files-left-out"),
+    **dict.fromkeys((*_LEFT_OUT, *_NO_CONTENT), "files-left-out"),
 }
 _TAGS: Final = {"files-ignored": "ignored", "files-used": "used", "files-left-out": "left out", "files-read-as-terrain": "terrain"}
 HEIGHTS_ALONE: Final = "heights-alone"
@@ -30,6 +31,11 @@ def unread(content: str) -> Message:
 def tag(note: Message) -> str:
     """Returns the word for what happens to a file: used, left out, ignored, terrain."""
     return _TAGS[_line_code(note)]
+
+
+def is_used(note: Message) -> bool:
+    """Whether files that are read use the file."""
+    return note.code in _USED
 
 
 def is_decided(note: Message) -> bool:

@@ -15,6 +15,7 @@ from map3d.formats.source_format import SourceFormat
 from map3d.ingest.file_copies import find_backups, find_copies
 from map3d.ingest.file_notes import unread
 from map3d.ingest.file_roles import find_used
+from map3d.ingest.other_files import is_written_by_map3d, note_others
 from map3d.ingest.unpacked_archives import UnpackedFiles
 from map3d.ingest.virtual_raster import find_virtual_sources
 from map3d.messages import Message, message
@@ -52,6 +53,7 @@ class FolderSearch:
     virtual: bool = False
     _found: list[FoundFile] = field(default_factory=list)
     _unknown: list[tuple[Path, Message]] = field(default_factory=list)
+    _noted: set[Path] = field(default_factory=set)
 
     def run(self) -> list[FoundFile]:
         """Returns the documents and rasters by path. Raises UnknownFormat if there is none, ImportFailed if an archive that cannot be unpacked
@@ -66,6 +68,10 @@ class FolderSearch:
         self._leave_out({path: note for path, note in copies.items() if path not in used} | used)
         if not self._found:
             raise self._nothing_found()
+        decided = {*(file.path for file in self._found), *(path for path, _ in self._unknown), *self._noted}
+        others = [path for path in paths if path not in decided and not self.unpacked.is_archive(path)]
+        for path, note in note_others(others, [(file.path, file.format, file.root) for file in self._found], self._noted, self._shown):
+            self.on_note(path, note)
         for path, reason in self._unknown:
             if unpacked_path(path).suffix.lower() in _SOURCE_SUFFIXES:
                 self.on_unreadable(path, reason)
@@ -79,7 +85,10 @@ class FolderSearch:
         archives = [archive.folder for archive in self.unpacked.within(self.folder) if archive.folder is not None]
         listed = []
         for root in (self.folder, *archives):
-            for path in sorted(path for path in _walk(root) if path.exists() and not path.name.startswith(".")):
+            for path in sorted(path for path in _walk(root) if path.exists()):
+                if path.name.startswith(".") or path.is_dir():
+                    self.on_note(path, message("left-own-folder" if path.is_dir() else "left-hidden"))
+                    continue
                 listed.append(path)
                 if not self.unpacked.is_archive(path):
                     self._detect(path, root)
@@ -110,6 +119,7 @@ class FolderSearch:
         if notes:
             self._found = [file for file in self._found if file.path not in notes]
             self._unknown = [(path, reason) for path, reason in self._unknown if path not in notes]
+            self._noted.update(notes)
             for path in sorted(notes):
                 self.on_note(path, notes[path])
 
@@ -152,10 +162,15 @@ def _read_head(path: Path) -> bytes:
 
 
 def _walk(folder: Path) -> Iterator[Path]:
-    """Yields the files below a folder. Raises NotFound for a folder that cannot be read: its files must not seem to be gone."""
+    """Yields the files below a folder, and in place of their files the folders that map3d wrote. Raises NotFound for a folder that cannot be read:
+    its files must not seem to be gone."""
 
     def refuse(error: OSError) -> None:
         raise NotFound(f"{error.filename}: cannot read the folder: {error.strerror}") from error
 
-    for place, _, names in os.walk(folder, onerror=refuse):
-        yield from (Path(place, name) for name in names)
+    for place, folders, names in os.walk(folder, onerror=refuse):
+        if Path(place) != folder and is_written_by_map3d(Path(place)):
+            folders.clear()
+            yield Path(place)
+        else:
+            yield from (Path(place, name) for name in names)

@@ -7,7 +7,7 @@ from typing import Final
 from map3d.catalogue import Catalogue, OperationRecord, Workspace
 from map3d.coherence.import_files import FilesImport, import_files
 from map3d.errors import ImportFailed
-from map3d.ingest.file_notes import note_lines
+from map3d.ingest.file_notes import is_used, note_lines
 from map3d.ingest.findings import findings, skipped_count
 from map3d.ingest.import_options import ImportOptions
 from map3d.ingest.importing import Imported
@@ -42,7 +42,10 @@ def do_import(workspace: Workspace, catalogue: Catalogue, operation: OperationRe
     counts = {"files": len(done.imported), "unchanged": len(done.unchanged)}
     if done.failed:
         raise ImportFailed(message("imported-in-part", **counts, failed=len(done.failed), reason=done.failed[0][1]))
-    return message("imported", **counts)
+    if not done.ignored:
+        return message("imported", **counts)
+    used = sum(is_used(note) for _, note in done.ignored)
+    return message("imported-of-files", **counts, used=used, ignored=len(done.ignored) - used)
 
 
 def _show_unpacked(report: OperationReport, file: str, done: int, total: int) -> None:

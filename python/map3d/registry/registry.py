@@ -128,6 +128,20 @@ class Registry:
         with self._database.reading() as db:
             return [int(row["id"]) for row in db.execute(query, tuple(classes))]
 
+    def union_box(self, without: Sequence[str]) -> Box | None:
+        """Returns the box of all present objects, without those of some classes; None if there are none with a box."""
+        query = f"""SELECT min(x0) AS x0, min(y0) AS y0, min(z0) AS z0, max(x1) AS x1, max(y1) AS y1, max(z1) AS z1 FROM object
+          WHERE present AND class NOT IN ({",".join("?" * len(without))})"""
+        with self._database.reading() as db:
+            return _box(db.execute(query, tuple(without)).fetchone())
+
+    def sample_boxes(self, without: Sequence[str], step: int) -> list[tuple[float, ...]]:
+        """Returns the boxes, lower and upper corners, of every `step`-th present object that is no part of another; without those of some classes."""
+        query = f"""SELECT x0, y0, z0, x1, y1, z1 FROM object WHERE present AND x0 IS NOT NULL AND parent IS NULL AND id % ? = 0
+          AND class NOT IN ({",".join("?" * len(without))}) ORDER BY id"""
+        with self._database.reading() as db:
+            return [tuple(row) for row in db.execute(query, (step, *without))]
+
     def objects(self) -> Iterator[RegisteredObject]:
         """Yields all present objects by id. Reads in pages, so that no transaction stays open in between."""
         last = 0

@@ -11,6 +11,7 @@ from map3d.errors import BadRequest
 from map3d.geometry.frames import PinnedFrame
 from map3d.registry import Registry
 from map3d.renderings.lon_lat import geographic_of
+from map3d.renderings.opening_view import read_objects_box, read_opening
 from map3d.renderings.thumbnail import make_thumbnail
 from map3d.tiles.block_versions import BlockVersions
 from map3d.tiles.manifest import Manifest, ManifestCrs, ManifestView, Thumbnail
@@ -38,8 +39,9 @@ def write_manifest(workspace: Workspace, catalogue: Catalogue, rendering: str, b
 def current_manifest(workspace: Workspace, catalogue: Catalogue, record: RenderingRecord, box: Box, planned: Planned) -> Manifest:
     scene = catalogue.scene(record.scene)
     counts = catalogue.count_jobs(record.name)
+    window = _start(record, box)
     with Registry(workspace.registry_path(record.scene)) as registry:
-        objects = registry.count()
+        objects, opening, objects_box = registry.count(), read_opening(registry, box, window), read_objects_box(registry, box)
     return Manifest(
         name=record.name,
         title=record.title or scene.title,
@@ -52,7 +54,9 @@ def current_manifest(workspace: Workspace, catalogue: Catalogue, record: Renderi
         passes=record.passes,
         views=tuple(_view(workspace, catalogue, record, frame, planned.get(frame.id)) for frame in record.frames),
         objects=objects,
-        start=_start(record, box),
+        objects_box=objects_box,
+        start=window if opening is None else opening.position,
+        start_radius_m=None if opening is None else opening.radius_m,
         geographic=geographic_of(scene, box),
         description=record.description,
         start_view=record.start_view,
@@ -77,7 +81,7 @@ def describe_manifest(workspace: Workspace, catalogue: Catalogue, record: Render
 
 
 def _start(record: RenderingRecord, box: Box) -> Vec3 | None:
-    """Returns the centre of the rendering's window, or None if it has no window: viewers then start at the centre of the box."""
+    """Returns the centre of the rendering's window, where its map opens; or None."""
     window = record.window
     return None if window is None else (window.x_m, window.y_m, (box[0][2] + box[1][2]) / 2)
 

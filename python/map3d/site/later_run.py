@@ -56,7 +56,7 @@ def apply_options(workspace: Workspace, catalogue: Catalogue, request: Site, rec
 
 
 def check_start_view(request: Site, views: Sequence[ViewAngles]) -> None:
-    """Raises BadRequest for a start view that is none of the views that the map will have."""
+    """Raises BadRequest for a start view that is not one of the views that the map will have."""
     known = [view_id(view) for view in views]
     if request.start_view is not None and view_id(request.start_view) not in known:
         raise BadRequest(f"--start-view {view_id(request.start_view)}: the map has the views {', '.join(known)}; --view adds views")

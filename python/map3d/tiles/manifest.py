@@ -82,8 +82,10 @@ class ManifestView:
 
 @dataclass(frozen=True)
 class Manifest:
-    """Everything that a client needs. `box`: of the content, local; `start`: local, None for the centre of the box; `start_view`: id of the view that
-    is shown first, None for the first of `views`; `archive_part_bytes`: size of the files in which archives are divided, 0 for whole archives."""
+    """Everything that a client needs. `box`: of the content, local; `start`: local, None for the centre of the box; `start_radius_m`: of the circle
+    around it that holds the first objects to be seen, or None; `start_view`: id of the view that is shown first, None for the first of `views`;
+    `objects_box`: local, of all objects but the ground, or None; `archive_part_bytes`: size of the files in which archives are divided, 0 for whole
+    archives."""
 
     name: str
     content_version: int
@@ -102,6 +104,8 @@ class Manifest:
     archive_part_bytes: int = 0
     description: str = ""
     start_view: str | None = None
+    start_radius_m: float | None = None
+    objects_box: Box | None = None
 
     def __post_init__(self) -> None:
         check_name(self.name, "rendering")
@@ -137,6 +141,7 @@ class Manifest:
     def to_json(self) -> dict[str, Any]:
         frame = self.views[0].frame
         start = self.start or tuple((low + high) / 2 for low, high in zip(*self.box, strict=True))
+        opening = {"radius_m": self.start_radius_m, "view": self.start_view}
         return {
             "map3d": "rendering",
             "version": VERSION,
@@ -150,7 +155,7 @@ class Manifest:
             **({} if self.geographic is None else {"geographic": asdict(self.geographic)}),
             "origin": list(self.origin),
             "box": [list(corner) for corner in self.box],
-            "start": {"local": list(start), **({} if self.start_view is None else {"view": self.start_view})},
+            "start": {"local": list(start), **{name: value for name, value in opening.items() if value is not None}},
             "tile_px": frame.tile_px,
             "zmax": frame.zmax,
             "size_m": frame.size_m,
@@ -160,6 +165,7 @@ class Manifest:
             "views": [_view_json(view, self.passes) for view in self.views],
             "objects": {
                 "count": self.objects,
+                **({} if self.objects_box is None else {"box": [list(corner) for corner in self.objects_box]}),
                 "shard_size": OBJECTS_PER_SHARD,
                 "shards": SHARDS,
                 "search": SEARCH,
@@ -200,6 +206,8 @@ class Manifest:
                 archive_part_bytes=int(value.get("archive_part_bytes", 0)),
                 description=value.get("description", ""),
                 start_view=value["start"].get("view"),
+                start_radius_m=value["start"].get("radius_m"),
+                objects_box=_parse_box(value["objects"].get("box")),
             )
         except (KeyError, TypeError, ValueError, IndexError, AttributeError, Map3dError) as error:
             raise Corrupt(f"{where}: invalid manifest: {type(error).__name__}: {error}") from error
@@ -298,6 +306,10 @@ def _parse_block(text: str, zmax: int) -> BlockId:
 def _parse_polynomials(value: Any) -> tuple[tuple[float, ...], tuple[float, ...]]:
     first, second = (tuple(float(c) for c in row) for row in value)
     return first, second
+
+
+def _parse_box(value: Any) -> Box | None:
+    return None if value is None else (_parse_vec3(value[0]), _parse_vec3(value[1]))
 
 
 def _parse_vec3(value: Any) -> Vec3:

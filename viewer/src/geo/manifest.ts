@@ -82,8 +82,8 @@ export interface ManifestJson {
   origin: Vec3;
   /** Bounding box of the content, local. */
   box: Box3;
-  /** `view`: the view that is shown first; without it, the first of `views`. */
-  start?: { local: Vec3; view?: string };
+  /** `view`: the view that is shown first; without it, the first of `views`. `radius_m`: of a circle around the start with some objects. */
+  start?: { local: Vec3; view?: string; radius_m?: number };
   tile_px: number;
   /** Deepest level. */
   zmax: number;
@@ -91,7 +91,8 @@ export interface ManifestJson {
   size_m: number;
   layers: LayerInfo[];
   views: ViewJson[];
-  objects?: { count: number; shard_size: number; shards: string; search?: string; attributes?: string; columns?: string };
+  /** `box`: of all objects but the ground, local. */
+  objects?: { count: number; box?: Box3; shard_size: number; shards: string; search?: string; attributes?: string; columns?: string };
 }
 
 /** A view of a rendering: its frame, its occupied tiles and the versions of its blocks. */

@@ -50,10 +50,17 @@ export function makeFirstCamera(
   { center, zoom, cover }: MapOptions,
 ): Camera {
   const { json } = rendering;
-  const whole = fitCamera({ frame, u: 0, v: 0, zoom: 0, width, height }, json.box, Math.min(width, height) * 0.04, json.zmax);
-  const fitted = cover ? fillScreen(whole, rendering.views.get(frame.id) as View, json.box) : whole;
-  const start = center && isVector(center) ? center : json.start && add(json.origin, json.start.local);
-  return start ? centerCamera(fitted, rendering, start, zoom) : { ...fitted, zoom: zoom ?? fitted.zoom };
+  const padding = Math.min(width, height) * 0.04;
+  const whole = fitCamera({ frame, u: 0, v: 0, zoom: 0, width, height }, json.box, padding, json.zmax);
+  const own = center && isVector(center) ? sub(center, json.origin) : undefined;
+  const local = own ?? json.start?.local ?? boxCenter(json.box);
+  const radius = own ? undefined : json.start?.radius_m;
+  // The first objects stay in view, and nothing is enlarged beyond its resolution.
+  const most = Math.min(json.zmax, radius ? zoomToFit(whole, 2 * radius, 2 * radius, padding) : json.zmax);
+  const fitted = cover ? fillScreen(whole, rendering.views.get(frame.id) as View, json.box, local, most) : whole;
+  // Away from the middle, everything is never in view: show the objects there.
+  const isAside = cover && radius && fitted === whole && boxCenter(json.box).some((at, axis) => axis < 2 && at !== local[axis as 0]);
+  return centerCamera(fitted, rendering, add(json.origin, local), zoom ?? (isAside ? most : fitted.zoom));
 }
 
 /** Returns the world position under CSS pixels at the height of the lowest content; null in level views. */

@@ -1,4 +1,4 @@
-import { clamp, type Box3 } from "../core/vec";
+import { clamp, type Box3, type Vec3 } from "../core/vec";
 import { depthAtHeight, localFromUvd, uvdFromLocal } from "../geo/axes";
 import { cssPixelM, projectedBox, uvFromScreen, zoomToFit, type Camera } from "../geo/camera";
 import type { View } from "../geo/manifest";
@@ -57,10 +57,10 @@ const FLAT = 0.3;
 /** Share of the screen that a landscape fills, number of points along each side where that is measured, and the most levels that it is enlarged. */
 const [FILLED, POINTS, ENLARGED] = [0.97, 12, 3];
 
-/** Enlarges the view of a landscape, with its ground at the centre, until it fills the screen; returns the same camera where that does not help. */
-export function fillScreen(camera: Camera, { frame, occupancy }: View, [low, high]: Box3): Camera {
+/** Enlarges the view of a landscape until it fills the screen; returns the same camera where that does not help. @param center local, by default that of the ground @param most the largest zoom */
+export function fillScreen(camera: Camera, { frame, occupancy }: View, [low, high]: Box3, center?: Vec3, most = Infinity): Camera {
   if (high[2] - low[2] > FLAT * Math.max(high[0] - low[0], high[1] - low[1])) return camera;
-  const [centerU, centerV] = uvdFromLocal(frame.axes, [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]);
+  const [centerU, centerV] = uvdFromLocal(frame.axes, center ?? [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]);
   const count = 2 ** frame.zmax;
   const hasContent = (at: Camera, k: number): boolean => {
     const [u, v] = uvFromScreen(at, [((k % POINTS) * at.width) / (POINTS - 1), (Math.floor(k / POINTS) * at.height) / (POINTS - 1)]);
@@ -73,6 +73,7 @@ export function fillScreen(camera: Camera, { frame, occupancy }: View, [low, hig
   };
   for (let step = 0; step <= 10 * ENLARGED; step++) {
     const larger = { ...camera, u: centerU, v: centerV, zoom: camera.zoom + step / 10 };
+    if (step > 0 && larger.zoom > most) break;
     if (Array.from({ length: POINTS ** 2 }).filter((_, k) => hasContent(larger, k)).length >= FILLED * POINTS ** 2) return larger;
   }
   return camera;

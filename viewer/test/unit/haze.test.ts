@@ -1,5 +1,8 @@
 import { expect, test } from "vitest";
-import { computeHaze } from "../../page/hazeMask";
+import { clearBox, computeHaze } from "../../page/hazeMask";
+import type { Vec3 } from "../../src/core/vec";
+import { uvdFromLocal } from "../../src/geo/axes";
+import { makeFrame } from "../../src/geo/frame";
 
 const SIDE = 64;
 const grid = (isInside: (x: number, y: number) => boolean): Uint8Array =>
@@ -108,4 +111,29 @@ test("a broad low tower with a spire on one side has no haze", () => {
     ) ?? new Uint8ClampedArray();
   for (let x = 40; x < 46; x++) for (let y = 19; y < 26; y++) expect(haze[y * SIDE + x], `${String(x)}, ${String(y)}`).toBe(0);
   expect([haze[12 * SIDE + 41], haze[24 * SIDE + 30], haze[24 * SIDE + 52]]).toEqual([0, 255, 255]);
+});
+
+test("haze veils no object, in any view", () => {
+  const box = [
+    [100, 100, 0],
+    [300, 200, 40],
+  ] as const;
+  for (const [lookAt, pitch] of [
+    [0, 45],
+    [45, 22.5],
+    [200, 60],
+    [0, 90],
+  ] as const) {
+    const frame = makeFrame({ id: "view", look_at_deg: lookAt, pitch_deg: pitch, u0_m: -512, v0_m: 512, d0_m: -1000 }, 1024, 256, 5);
+    const haze = new Uint8ClampedArray(128 * 128).fill(255);
+    clearBox(haze, 128, frame, box);
+    const opacity = (local: Vec3): number | undefined => {
+      const [u, v] = uvdFromLocal(frame.axes, local);
+      return haze[Math.floor((frame.v0 - v) / 8) * 128 + Math.floor((u - frame.u0) / 8)];
+    };
+    for (const x of [100, 200, 300]) for (const y of [100, 150, 200]) for (const z of [0, 40]) expect(opacity([x, y, z])).toBe(0);
+    expect(opacity([-60, 150, 0])).toBe(255);
+    expect(opacity([460, 150, 0])).toBe(255);
+    expect(haze.filter((alpha) => alpha === 0).length).toBeLessThan(700);
+  }
 });
