@@ -148,7 +148,7 @@ def _not_drawn(found: Mapping[str, Any], folder: Path) -> Iterator[str]:
         without.update({kind["kind"].replace("_", " "): kind["count"] - kind["drawn"] for kind in file["kinds"] if kind["count"] > kind["drawn"]})
     yield from (str(found.message).removesuffix(".") for found in sum_findings(skipped))
     yield from (f"{count:,} {kind} without geometry" for kind, count in without.most_common())
-    others = [*((path, reason["text"]) for path, reason in found["failed"]), *found["ignored"]]
+    others = [(path, reason["text"]) for path, reason in [*found["failed"], *found["ignored"]]]
     reasons = Counter(_plain(reason.removeprefix(f"{path}: "), folder, Path(path).name) for path, reason in others)
     for reason, count in reasons.most_common(MAX_REASONS):
         yield f"{_count(count, 'file')}: {reason}"

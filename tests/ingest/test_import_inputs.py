@@ -129,6 +129,6 @@ def test_readers_that_make_other_assets_have_another_version(tmp_path: Path) -> 
     write(tmp_path / "c.tif", (np.arange(17 * 17) * 5 % 11).reshape(1, 17, 17).astype(np.float32))
     found = {name: imported(tmp_path, tmp_path / name, ImportOptions(crs="EPSG:25832")).digest for name in ("a.obj", "b.gml", "c.tif")}
     assert ({format.name: format.version for format in FORMATS}, found) == (
-        {"citygml": 12, "obj": 4, "raster": 6},
+        {"citygml": 13, "obj": 4, "raster": 6},
         {"a.obj": "8d0ceef106fedeffefc608f4ab2e7ffa", "b.gml": "ce43c3ba3b9953057ef04c13e472131e", "c.tif": "c5f3a36ca5208765445bbcd024ea08ea"},
     )

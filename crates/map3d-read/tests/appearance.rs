@@ -245,6 +245,29 @@ fn georeferenced_textures_use_reference_point_or_world_file() {
 }
 
 #[test]
+fn georeferenced_textures_lie_in_their_place_where_the_document_has_the_northing_first() {
+    let folder = Folder::new("northing-first");
+    folder.put_png("u.png", 4, 4, [1, 2, 3, 255]);
+    folder.put("u.pgw", "0.5\n0\n0\n-0.5\n1000.25\n51.75\n");
+    let uvs = |corners: [[u32; 2]; 4]| {
+        let numbers: Vec<String> = corners.iter().chain(&corners[..1]).map(|[x, y]| format!("{x} {y} 0")).collect();
+        let text = format!(
+            "<CityModel xmlns:gml='g'><cityObjectMember><Building gml:id='b'><lod1MultiSurface><gml:MultiSurface><gml:surfaceMember>\
+             <gml:Polygon gml:id='p'><gml:exterior><gml:LinearRing><gml:posList>{}</gml:posList></gml:LinearRing></gml:exterior></gml:Polygon>\
+             </gml:surfaceMember></gml:MultiSurface></lod1MultiSurface></Building></cityObjectMember>{}</CityModel>",
+            numbers.join(" "),
+            member("a", "<GeoreferencedTexture><imageURI>u.png</imageURI><wrapMode>none</wrapMode><target>#p</target></GeoreferencedTexture>")
+        );
+        let document = read_with(&folder.put("a.gml", text), &CITYGML, &ReadOptions::default()).expect("readable");
+        document.triangles()[0].uvs
+    };
+    let expected = Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+    assert_eq!(uvs([[1000, 50], [1002, 50], [1002, 52], [1000, 52]]), expected);
+    assert_eq!(uvs([[50, 1000], [50, 1002], [52, 1002], [52, 1000]]), expected);
+    assert_ne!(uvs([[3000, 50], [3002, 50], [3002, 52], [3000, 52]]), expected, "beyond the image in both orders");
+}
+
+#[test]
 fn a_reference_point_in_another_system_is_used_only_where_the_places_agree() {
     let texture = |name: &str, at: &str| {
         let point = format!("<referencePoint><gml:Point srsName='{name}'><gml:pos>{at}</gml:pos></gml:Point></referencePoint>");

@@ -287,16 +287,28 @@ impl MaterialResolver {
                 return Ok(false);
             }
         };
-        uvs.extend(rings.iter().flat_map(|r| r.points).map(|p| geo_transform.compute_uv(*p, size_px)));
+        let points = || rings.iter().flat_map(|r| r.points);
+        uvs.extend(points().map(|p| geo_transform.compute_uv(*p, size_px)));
+        if !overlap_image(uvs) {
+            // World files have the easting first, documents perhaps the northing.
+            let swapped: Vec<[f64; 2]> = points().map(|&[x, y, z]| geo_transform.compute_uv([y, x, z], size_px)).collect();
+            if overlap_image(&swapped) {
+                *uvs = swapped;
+            }
+        }
         check_place(matches!(fit, Fit::Unknown), uvs, report)
     }
+}
+
+/// Returns whether the box of texture coordinates shares a part of the image.
+fn overlap_image(uvs: &[[f64; 2]]) -> bool {
+    [0, 1].into_iter().all(|axis| uvs.iter().any(|uv| uv[axis] <= 1.0) && uvs.iter().any(|uv| uv[axis] >= 0.0))
 }
 
 /// Returns false, after a warning, for a texture whose reference point names another coordinate system and that lies elsewhere: equal places
 /// show that the two are the same by another name.
 fn check_place(is_other: bool, uvs: &[[f64; 2]], report: &mut ReportBuilder) -> Result<bool> {
-    let overlaps = |axis: usize| uvs.iter().any(|uv| uv[axis] <= 1.0) && uvs.iter().any(|uv| uv[axis] >= 0.0);
-    if is_other && !(overlaps(0) && overlaps(1)) {
+    if is_other && !overlap_image(uvs) {
         report.warn(Reason::GeoreferencedTextureInOtherCrs, String::new())?;
         return Ok(false);
     }

@@ -33,7 +33,7 @@ use crate::document::source_format::SourceFormat;
 
 pub const CITYGML: SourceFormat = SourceFormat {
     name: NAME,
-    version: 12,
+    version: 13,
     is_library_object: false,
     detect: is_city_model,
     open: |path, options, formats| Ok(Box::new(CityGmlReader::open(path, options, formats)?)),
