@@ -70,7 +70,9 @@ def test_a_file_that_touches_wrong_ones_alone_is_named_for_its_own_fault() -> No
 def test_single_objects_contradict_several_others_if_they_are_far_off() -> None:
     assert of_files(beside("a", tiles=0), beside("b", tiles=1, above=80.0)[:2]) == []
     assert of_files(beside("a", tiles=0), beside("b", tiles=1, above=500.0)[:2]) == [(1, 0, "heights-above-terrain", 498)]
-    assert of_files(beside("a", tiles=0)[-1:], beside("b", tiles=1, above=500.0)[:2]) == [], "two against one are no evidence"
+    lone = [beside("a", tiles=0)[-1:], beside("b", tiles=1)[3:4]]
+    assert of_files(*lone) == of_files(lone[0], [replace(house, z=house.z + 80.0) for house in lone[1]]) == []
+    assert of_files(lone[0], [replace(house, z=house.z + 500.0) for house in lone[1]]) == [(1, 0, "heights-above-terrain", 500)]
 
 
 @pytest.mark.parametrize(("above", "code"), [(-500.0, "heights-unlike-file"), (46.5, "heights-ellipsoidal-beside-file")])

@@ -18,6 +18,8 @@ from map3d.ingest.findings import findings
 from map3d.ingest.import_options import ImportOptions
 
 Size = tuple[float, float, float]
+USED_BESIDE = "used-beside"
+"""The note of a file that lies beside another one and belongs to it."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,8 @@ def draw(folder: Path, options: Mapping[str, Any]) -> Drawn:
     low, high = np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
     to_degrees = Transformer.from_crs(horizontal_crs(parse_crs(scene.crs.wkt)), "EPSG:4326", always_xy=True)
     lon, lat = to_degrees.transform(*((low + high) / 2)[:2])
-    said = sorted({found.reason.code for asset in assets for found in findings(asset.report)} | {note.code for _, note in done.ignored})
+    notes = {note.code for _, note in done.ignored} - {USED_BESIDE}
+    said = sorted({found.reason.code for asset in assets for found in findings(asset.report)} | notes)
     textures = sum(len(list((one / "textures").iterdir())) for one in folders)
     x, y, z = high - low
     failed = tuple(str(reason) for _, reason in done.failed)

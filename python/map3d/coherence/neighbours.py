@@ -20,8 +20,8 @@ STEEPEST: Final = 0.5
 """Rise of the ground, in metres per metre, that explains the distance between the bases of two cells."""
 LEAST_OBJECTS: Final = 3
 LONE_M: Final = 100.0
-"""Least number of objects of each of two files in cells that are compared. Fewer ones, as of a model that is one object, contradict several others by
-this distance."""
+"""Least number of objects of each of two files in cells that are compared. Fewer ones, as of models that are one object, contradict others by this
+distance."""
 SAME_LEVEL: Final = 0.1
 """Part of the distance between two files by which others may differ that are as far from them."""
 
@@ -184,7 +184,7 @@ def _touching(levels: Sequence[int], pairs: Mapping[tuple[int, int], _Pair]) -> 
 
 
 def _pairs(files: Sequence[FileBases]) -> Iterator[tuple[tuple[int, int], _Pair]]:
-    """Yields what several objects of two files tell, for each two files that touch."""
+    """Yields what the objects of two files tell, for each two files that touch."""
     cells = _Cells(files)
     if len(np.unique(cells.owners)) < 2:
         return
@@ -197,11 +197,10 @@ def _pairs(files: Sequence[FileBases]) -> Iterator[tuple[tuple[int, int], _Pair]
     starts = np.flatnonzero(np.any(np.diff(both, axis=0, prepend=-1) != 0, axis=1))
     for start, end in zip(starts, [*starts[1:], len(one)], strict=True):
         own, beside = one[start:end], other[start:end]
-        fewer, more = sorted(int(cells.counts[np.unique(side)].sum()) for side in (own, beside))
-        if more >= LEAST_OBJECTS:
-            apart_m = np.hypot(*(cells.middles[own] - cells.middles[beside]).T) + (cells.sizes[own] + cells.sizes[beside]) / 2
-            least_m = TOLERANCE_M if fewer >= LEAST_OBJECTS else LONE_M
-            yield (int(both[start, 0]), int(both[start, 1])), _Pair(cells.heights[own], cells.heights[beside], apart_m, least_m)
+        fewer = min(int(cells.counts[np.unique(side)].sum()) for side in (own, beside))
+        apart_m = np.hypot(*(cells.middles[own] - cells.middles[beside]).T) + (cells.sizes[own] + cells.sizes[beside]) / 2
+        least_m = TOLERANCE_M if fewer >= LEAST_OBJECTS else LONE_M
+        yield (int(both[start, 0]), int(both[start, 1])), _Pair(cells.heights[own], cells.heights[beside], apart_m, least_m)
 
 
 class _Cells:
