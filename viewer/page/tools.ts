@@ -93,9 +93,9 @@ export class Tools {
     this.#showResults();
   }
 
-  /** Shows the results in place of the hint, as soon as there are any. */
+  /** Shows the results in place of the hint, as soon as there are any; the hint then says what makes them doubtful. */
   #showResults(): void {
-    const results = this.#tool?.results ?? [];
+    const { results = [], warnings = [] } = this.#tool ?? {};
     byId("measured").replaceChildren(
       ...results.map(([name, value]) => {
         const row = document.createElement("div");
@@ -104,7 +104,9 @@ export class Tools {
       }),
     );
     byId("measured").hidden = results.length === 0;
-    byId("hint").hidden = results.length > 0;
+    const warning = warnings.join(" ");
+    if (this.#kind) byId("hint").textContent = warning || hintOf(this.#kind);
+    byId("hint").hidden = results.length > 0 && !warning;
     for (const id of ["measure-undo", "measure-clear"]) (byId(id) as HTMLButtonElement).disabled = (this.#tool?.corners.length ?? 0) === 0;
   }
 }

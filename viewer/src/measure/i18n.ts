@@ -16,6 +16,8 @@ const TRANSLATIONS = {
     slope: "Slope",
     perimeter: "Perimeter",
     elevation: "Elevation",
+    offPlumb: "The points are not one above the other.",
+    pastEdge: "A point fell past an edge, onto what lies behind it.",
   },
   de: {
     profile: "Höhenprofil",
@@ -29,6 +31,8 @@ const TRANSLATIONS = {
     slope: "Neigung",
     perimeter: "Umfang",
     elevation: "Höhenlage",
+    offPlumb: "Die Punkte liegen nicht übereinander.",
+    pastEdge: "Ein Punkt liegt neben einer Kante, auf dem, was dahinter ist.",
   },
   fr: {
     profile: "Profil altimétrique",
@@ -42,6 +46,8 @@ const TRANSLATIONS = {
     slope: "Pente",
     perimeter: "Périmètre",
     elevation: "Altitude",
+    offPlumb: "Les points ne sont pas l’un au-dessus de l’autre.",
+    pastEdge: "Un point est tombé à côté d’une arête, sur ce qui se trouve derrière.",
   },
 };
 
@@ -115,6 +121,14 @@ export class MeasureMessages {
       [level, (approximate ? "≈ " : "") + this.length(length_m)],
       [elevation, known.length > 0 ? this.range(Math.min(...known), Math.max(...known)) : this.#messages.allHidden],
     ];
+  }
+
+  get offPlumb(): string {
+    return this.#messages.offPlumb;
+  }
+
+  get pastEdge(): string {
+    return this.#messages.pastEdge;
   }
 
   get profile(): string {

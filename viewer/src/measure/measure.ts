@@ -1,6 +1,7 @@
 import { adoptStyles } from "../core/dom";
 import { asError } from "../core/errors";
-import type { Vec3 } from "../core/vec";
+import { sub, type Vec3 } from "../core/vec";
+import { uvdFromLocal } from "../geo/axes";
 import { MapLayer, type ClickEvent, type Map3D } from "../map3d";
 import { measureArea, measureLine, type AreaMeasure, type LineMeasure } from "./geometry";
 import { ProfileChart } from "./profileChart";
@@ -23,7 +24,16 @@ export interface MeasureCorner {
   readonly position: Vec3;
   /** Read above the deepest level. */
   readonly approximate: boolean;
+  /** Something nearer ends beside the click, which perhaps meant that. */
+  readonly pastEdge?: boolean;
 }
+
+/** An edge so near to a click, in CSS pixels, makes it doubtful. A finger is less exact than a mouse. */
+const EDGE_PX = 6;
+/** What is nearer than the click by this many metres, and this many times the distance on the screen, is in front of it. */
+const [EDGE_M, EDGE_SLOPE] = [1, 4];
+/** Points of a height this far from one vertical, in metres and as a share of the height, are not one above the other. */
+const [PLUMB_M, PLUMB_SHARE] = [1, 0.2];
 
 export interface MeasureEvents {
   /** The corners have changed. */
@@ -96,6 +106,14 @@ export class Measure extends MapLayer<Map3D, MeasureEvents> {
     return count < 3 ? [] : this.#messages.describeArea(area, prefix);
   }
 
+  /** What makes the results doubtful, in the user's language: a height between points that are not one above the other, a point that fell past an edge. */
+  get warnings(): readonly string[] {
+    const { horizontal_m, rise_m } = this.line;
+    const isOff = this.options.kind === "height" && horizontal_m > Math.max(PLUMB_M, PLUMB_SHARE * Math.abs(rise_m));
+    const isPast = this.#corners.some(({ pastEdge }) => pastEdge);
+    return [...(isOff ? [this.#messages.offPlumb] : []), ...(isPast ? [this.#messages.pastEdge] : [])];
+  }
+
   /** Replaces all corners. */
   setCorners(corners: readonly MeasureCorner[]): this {
     [this.#corners, this.#face] = [corners, null];
@@ -136,11 +154,28 @@ export class Measure extends MapLayer<Map3D, MeasureEvents> {
     this.#closeChart();
   }
 
-  readonly #onClick = ({ position, approximate }: ClickEvent): void => {
+  readonly #onClick = ({ position, approximate, point }: ClickEvent): void => {
     if (!position) return;
     const kept = this.options.kind === "height" && this.#corners.length > 1 ? [] : this.#corners;
-    this.setCorners([...kept, { position, approximate }]);
+    const corner = { position, approximate };
+    this.setCorners([...kept, corner]);
+    void this.#checkEdge(corner, point);
   };
+
+  /** Marks the corner if something nearer ends beside the click. */
+  async #checkEdge(corner: MeasureCorner, [x, y]: ClickEvent["point"]): Promise<void> {
+    const { map } = this;
+    const axes = map?.getViewState()?.camera.frame.axes;
+    if (!map || !axes) return;
+    const least_m = Math.max(EDGE_M, EDGE_SLOPE * EDGE_PX * map.metresPerPixel);
+    const picks = await Promise.all(
+      [0, 1, 2, 3, 4, 5, 6, 7].map((k) => map.pick([x + EDGE_PX * Math.cos((k * Math.PI) / 4), y + EDGE_PX * Math.sin((k * Math.PI) / 4)])),
+    );
+    const isNearer = picks.some(({ position }) => position && uvdFromLocal(axes, sub(corner.position, position))[2] > least_m);
+    if (!isNearer || !this.#corners.includes(corner)) return;
+    this.#corners = this.#corners.map((other) => (other === corner ? { ...corner, pastEdge: true } : other));
+    this.fire("change", { corners: this.#corners, line: this.line, area: this.area });
+  }
 
   readonly #onKeyDown = ({ key }: KeyboardEvent): void => {
     if (key === "Backspace") this.undo();

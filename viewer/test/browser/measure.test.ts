@@ -246,3 +246,29 @@ test("a profile has the heights of the model and gaps where it is hidden; pointe
   await page.screenshot({ path: `${OUT}/measure-profile-hidden.png` });
   expect(problems).toEqual([]);
 });
+
+test("a height between points that are not one above the other is doubtful, and so is a point that fell past an edge", async () => {
+  const { page, problems } = await measuring("height");
+  const warnings = (): Promise<string[]> => page.evaluate(() => [...(globalThis as unknown as Measuring).tool.warnings]);
+  await clickAll(page, [
+    [-45, -22, 2],
+    [-45, -22, 30],
+  ]);
+  expect(await warnings()).toEqual([]);
+  await clickAll(page, [
+    [-45, -30, 0],
+    [-45, -4, 34],
+  ]);
+  expect(await warnings()).toEqual(["The points are not one above the other."]);
+  // A few pixels above the far edge of the roof, on the ground behind it.
+  const at = await page.evaluate((world) => (globalThis as Global).map.project(world) as [number, number], [
+    ORIGIN[0] - 45,
+    ORIGIN[1] + 14,
+    ORIGIN[2] + 34,
+  ] as const);
+  await page.evaluate(() => (globalThis as unknown as Measuring).tool.clear());
+  await page.mouse.click(at[0], at[1] - 4);
+  await page.waitForFunction(() => (globalThis as unknown as Measuring).tool.corners[0]?.pastEdge);
+  expect(await warnings()).toEqual(["A point fell past an edge, onto what lies behind it."]);
+  expect(problems).toEqual([]);
+});
