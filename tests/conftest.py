@@ -74,3 +74,15 @@ def mongo_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     session_processes.add(process.pid)
     yield process.url
     process.stop()
+
+
+@pytest.fixture
+def own_mongo_server(tmp_path: Path) -> Iterator[MongoProcess]:
+    """A MongoDB server that the test may end and start again."""
+    try:
+        build()
+        process = MongoProcess(tmp_path).start()
+    except Unavailable as error:
+        pytest.skip(f"MongoDB is not tested: {error}")
+    yield process
+    process.stop()

@@ -24,10 +24,11 @@ def read_statements(path: Path) -> dict[str, str]:
 
 
 class Connections:
-    """One connection to the file at `path` per thread; a connection never crosses a fork. `connect` opens a connection in autocommit mode."""
+    """One connection to the file at `path` per thread; a connection never crosses a fork. `connect` opens a connection in autocommit mode; `wait_s`:
+    how long a transaction may wait for those of other threads."""
 
-    def __init__(self, path: Path, connect: Callable[[], sqlite3.Connection]) -> None:
-        self.path = path
+    def __init__(self, path: Path, connect: Callable[[], sqlite3.Connection], wait_s: float = BUSY_TIMEOUT_S) -> None:
+        self.path, self._wait_s = path, wait_s
         self._connect = connect
         self._local = threading.local()
         self._opened: list[tuple[int, sqlite3.Connection]] = []
@@ -39,7 +40,7 @@ class Connections:
         """Opens a write transaction: commits it at the end, rolls it back on any exception. Raises StoreError."""
         try:
             db = self.current()
-            with self._writer_lock():
+            with self._writing():
                 db.execute("BEGIN IMMEDIATE")
                 try:
                     yield db
@@ -51,11 +52,18 @@ class Connections:
         except sqlite3.Error as error:
             raise StoreError(f"{self.path}: cannot write: {error}") from error
 
-    def _writer_lock(self) -> threading.Lock:
-        """Returns the lock under which the threads of this process write one after another: SQLite would let them poll. A fork gets its own."""
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Lets the threads of this process write one after another: SQLite would let them poll. A fork has a lock of its own."""
         if self._writer[0] != os.getpid():
             self._writer = (os.getpid(), threading.Lock())
-        return self._writer[1]
+        lock = self._writer[1]
+        if not lock.acquire(timeout=self._wait_s):
+            raise sqlite3.OperationalError("database is locked")
+        try:
+            yield
+        finally:
+            lock.release()
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
@@ -103,8 +111,8 @@ class Database(Connections):
     writing into one that no other process sees.
     """
 
-    def __init__(self, path: Path, schema: str, version: int, migrations: Mapping[int, str] | None = None) -> None:
-        super().__init__(path, lambda: _connect(path))
+    def __init__(self, path: Path, schema: str, version: int, migrations: Mapping[int, str] | None = None, wait_s: float = BUSY_TIMEOUT_S) -> None:
+        super().__init__(path, lambda: _connect(path, wait_s), wait_s)
         self._file: tuple[int, int] | None = None
         with self.transaction() as db:
             found = int(db.execute("PRAGMA user_version").fetchone()[0])
@@ -148,8 +156,8 @@ def run_script(db: sqlite3.Connection, script: str) -> None:
             statement = ""
 
 
-def _connect(path: Path) -> sqlite3.Connection:
-    connection = sqlite3.connect(path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False)
+def _connect(path: Path, wait_s: float) -> sqlite3.Connection:
+    connection = sqlite3.connect(path, timeout=wait_s, isolation_level=None, check_same_thread=False)
     try:
         connection.row_factory = sqlite3.Row
         connection.execute("PRAGMA journal_mode = WAL")

@@ -46,7 +46,7 @@ def new_urls(implementation: str, request: pytest.FixtureRequest, folder: Path) 
 def lose_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     run = MongoConnection.run
 
-    def run_twice(self: MongoConnection, action: Callable[[bool], object], retry_s: float = mongodb_connection.RETRY_S) -> object:
+    def run_twice(self: MongoConnection, action: Callable[[bool], object], retry_s: float | None = None) -> object:
         def act(repeated: bool) -> object:
             answer = action(repeated)
             if not repeated:

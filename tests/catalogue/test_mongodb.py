@@ -15,7 +15,7 @@ from map3d.catalogue.mongodb_connection import VERSION, MongoConnection
 from map3d.errors import BadRequest, StaleFence, StoreError, UnknownVersion
 from map3d.types import BlockId
 from tests.catalogue.implementations import Kill, NewUrl, new_urls, rendering
-from tests.catalogue.mongo_process import MongoProcess, Unavailable, build
+from tests.catalogue.mongo_process import MongoProcess
 from tests.catalogue.pyramids import RESULT, TRACKS, described, pyramid, work_off
 
 TRACK = TRACKS[:1]
@@ -91,21 +91,9 @@ def final_states(catalogue: Catalogue) -> list[tuple[object, ...]]:
     return [(job.track, job.block, job.key, job.state, job.result) for job in catalogue.jobs("town-a")]
 
 
-@pytest.fixture
-def own_server(tmp_path: Path) -> Iterator[MongoProcess]:
-    """A server that the test may end and start again."""
-    try:
-        build()
-        server = MongoProcess(tmp_path).start()
-    except Unavailable as error:
-        pytest.skip(f"MongoDB is not tested: {error}")
-    yield server
-    server.stop()
-
-
 @pytest.mark.parametrize("way", ["stop", "kill"])
-def test_server_that_ends_and_comes_back_costs_only_time(own_server: MongoProcess, way: str) -> None:
-    catalogue = open_catalogue(f"{own_server.url}/town", lease_s=1)
+def test_server_that_ends_and_comes_back_costs_only_time(own_mongo_server: MongoProcess, way: str) -> None:
+    catalogue = open_catalogue(f"{own_mongo_server.url}/town", lease_s=1)
     catalogue.create_scene(SceneRecord("town"))
     catalogue.create_rendering(rendering())
     jobs = [PlannedJob("0-45", BlockId(10, x, 0), "base", x, "k", None) for x in range(60)]
@@ -117,8 +105,8 @@ def test_server_that_ends_and_comes_back_costs_only_time(own_server: MongoProces
     for done in (10, 25, 40):
         while catalogue.count_jobs("town-a")[State.DONE] < done:
             assert not errors
-        getattr(own_server, way)()
-        own_server.start()
+        getattr(own_mongo_server, way)()
+        own_mongo_server.start()
     for thread in threads:
         thread.join(60)
     assert not errors
@@ -149,10 +137,10 @@ def test_missing_server_is_reported_without_the_password(monkeypatch: pytest.Mon
     assert "s3cr3t" not in message
 
 
-def test_server_that_is_away_for_too_long_is_reported(own_server: MongoProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_server_that_is_away_for_too_long_is_reported(own_mongo_server: MongoProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mongodb_connection, "_SELECTION_MS", 200)
-    catalogue = open_catalogue(f"{own_server.url}/town")
-    own_server.stop()
+    catalogue = open_catalogue(f"{own_mongo_server.url}/town")
+    own_mongo_server.stop()
     connection = catalogue._connection  # type: ignore[attr-defined]
     with pytest.raises(StoreError, match=r"/town: cannot reach the MongoDB server for 0 s .*start it"):
         connection.run(lambda _: connection.collection("scene").find_one({}), 0.0)

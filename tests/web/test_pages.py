@@ -103,7 +103,7 @@ def test_large_documents_are_compressed_on_request(client, workspace):
 def test_modules_have_a_javascript_media_type(client, built_viewer):
     (built_viewer / "map3d.module.js").write_text("export {}")
     assert "javascript" in client.get("/view/tea/map3d.module.js").headers["content-type"]
-    assert client.get("/view/none/map3d.module.js").status_code == 404
+    assert client.get("/view/tea/none.module.js").status_code == 404
 
 
 def test_the_viewers_files_are_compressed_on_request(client, built_viewer):

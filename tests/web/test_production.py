@@ -258,6 +258,31 @@ def test_running_requests_are_answered_after_sigterm(start):
     assert server.process.wait(WAIT_S) == 0
 
 
+def test_web_processes_that_die_again_and_again_are_started_again(start):
+    """granian itself gives up when a process dies twice within seconds."""
+    server = start()
+    for _ in range(3):
+        wait_until(lambda: answers(server.address))
+        os.kill(web_process(server), signal.SIGKILL)
+    wait_until(lambda: answers(server.address))
+    assert "they are started again in" in server.errors.read_text()
+    server.signal(signal.SIGTERM)
+    assert server.process.wait(WAIT_S) == 0
+
+
+def answers(address: str) -> bool:
+    try:
+        return httpx.get(address + "/healthz", timeout=1).status_code == 200
+    except httpx.HTTPError:
+        return False
+
+
+def web_process(server: Server) -> int:
+    """Returns the process that listens."""
+    children = Path(f"/proc/{server.process.pid}/task/{server.process.pid}/children").read_text().split()
+    return next(int(pid) for pid in children if b"resource_tracker" not in Path(f"/proc/{pid}/cmdline").read_bytes())
+
+
 def accepts(address: httpx.URL) -> bool:
     try:
         socket.create_connection((address.host, address.port), timeout=WAIT_S).close()

@@ -11,7 +11,7 @@ from typing import Any, Final, Self
 from map3d.catalogue import codec
 from map3d.catalogue.contract import LEASE_S
 from map3d.catalogue.mongodb_accounts import MongoAccounts
-from map3d.catalogue.mongodb_connection import Document, MongoConnection
+from map3d.catalogue.mongodb_connection import WAIT_S, Document, MongoConnection
 from map3d.catalogue.mongodb_documents import new_call
 from map3d.catalogue.mongodb_operations import MongoOperations
 from map3d.catalogue.records import AssetRecord, RenderingRecord, SceneCrs, SceneRecord
@@ -39,8 +39,8 @@ _RENDERING: Final = (
 class MongoCatalogue(MongoOperations, MongoAccounts):
     """Implements `Catalogue` in the database that the URL names; creates collections and indexes when they do not exist."""
 
-    def __init__(self, url: str, *, lease_s: float = LEASE_S) -> None:
-        super().__init__(MongoConnection(url), lease_s)
+    def __init__(self, url: str, *, lease_s: float = LEASE_S, wait_s: float | None = None) -> None:
+        super().__init__(MongoConnection(url, WAIT_S if wait_s is None else wait_s), lease_s)
 
     def close(self) -> None:
         self._connection.close()

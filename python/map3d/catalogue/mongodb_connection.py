@@ -40,11 +40,11 @@ MIGRATIONS: Final[Mapping[int, Callable[[Database[Document]], None]]] = {2: _add
 """Version → function that leads to it from the version before. It must be repeatable."""
 CONNECT_S: Final = 10.0
 """How long the first connection may take."""
-RETRY_S: Final = 180.0
-"""How long a call is repeated while the server cannot be reached. Longer than a lease, so that a restarted server costs only time."""
+WAIT_S: Final = 240.0
+"""How long a call may take while the server cannot be reached or does not answer. Longer than a lease, so that a restarted server costs only time."""
 _NO_SUCH_COMMAND: Final = 59
 _SELECTION_MS: Final = 2_000
-_SOCKET_MS: Final = 60_000
+_ATTEMPT_S: Final = 60.0
 _PAUSES_S: Final = (0.05, 2.0)
 """First and longest pause between two attempts."""
 
@@ -61,13 +61,16 @@ class MongoConnection:
     """One client per process; a client never crosses a fork. Safe to share between threads. Raises BadRequest for an invalid URL, StoreError when the
     server cannot be reached, UnknownVersion when a newer map3d wrote the database."""
 
-    def __init__(self, url: str) -> None:
+    def __init__(self, url: str, wait_s: float = WAIT_S) -> None:
+        """`wait_s`: how long a call may take while the server cannot be reached or does not answer."""
         self.name = redact_url(url)
+        self._attempt_s = min(_ATTEMPT_S, wait_s / 2)
+        self._retry_s = wait_s - self._attempt_s
         self._url, self._database_name = url, _database_of(url)
         self._lock = threading.Lock()
         self._clients: dict[int, MongoClient[Document]] = {}
         try:
-            self.run(lambda _repeated: self._prepare(), CONNECT_S)
+            self.run(lambda _repeated: self._prepare(), min(CONNECT_S, self._retry_s))
         except BaseException:
             self.close()
             raise
@@ -82,9 +85,10 @@ class MongoConnection:
     def collection(self, name: str) -> Collection[Document]:
         return self._database()[name]
 
-    def run(self, action: Callable[[bool], Result], retry_s: float = RETRY_S) -> Result:
+    def run(self, action: Callable[[bool], Result], retry_s: float | None = None) -> Result:
         """Returns the result of `action`, which is repeated after network errors. Its argument tells whether an earlier attempt may have been
         executed without an answer. Raises StoreError."""
+        retry_s = self._retry_s if retry_s is None else retry_s
         deadline, pause, repeated = time.monotonic() + retry_s, _PAUSES_S[0], False
         while True:
             try:
@@ -133,14 +137,15 @@ class MongoConnection:
         return client.get_database(self._database_name, write_concern=WriteConcern("majority", j=True))
 
     def _connect(self) -> MongoClient[Document]:
+        attempt_ms = int(1000 * self._attempt_s)
         try:
             return MongoClient(
                 self._url,
                 appname="map3d",
                 tz_aware=True,
-                serverSelectionTimeoutMS=_SELECTION_MS,
-                connectTimeoutMS=_SELECTION_MS,
-                socketTimeoutMS=_SOCKET_MS,
+                serverSelectionTimeoutMS=min(_SELECTION_MS, attempt_ms),
+                connectTimeoutMS=min(_SELECTION_MS, attempt_ms),
+                socketTimeoutMS=attempt_ms,
             )
         except (InvalidURI, ConfigurationError, ValueError):
             raise _invalid(self._url) from None

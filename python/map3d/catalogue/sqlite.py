@@ -13,7 +13,7 @@ from map3d.catalogue.records import AssetRecord, RenderingRecord, SceneCrs, Scen
 from map3d.catalogue.sqlite_accounts import ACCOUNT_SCHEMA, SqliteAccounts
 from map3d.catalogue.sqlite_job_table import JOB_COUNTS, JOB_NEXT, JOB_ORDER, JOB_SCHEMA
 from map3d.catalogue.sqlite_operations import OPERATION_SCHEMA, SqliteOperations
-from map3d.database import Database
+from map3d.database import BUSY_TIMEOUT_S, Database
 from map3d.errors import AlreadyExists, BadRequest, NotFound
 from map3d.geometry.frames import PinnedFrame
 from map3d.types import Layer, Vec3, check_name
@@ -54,8 +54,8 @@ _MIGRATIONS: Final = {
 class SqliteCatalogue(SqliteOperations, SqliteAccounts):
     """Implements `Catalogue`; creates the file when it does not exist, and migrates an older one."""
 
-    def __init__(self, path: Path, *, lease_s: float = LEASE_S) -> None:
-        super().__init__(Database(path, _SCHEMA, VERSION, _MIGRATIONS), lease_s)
+    def __init__(self, path: Path, *, lease_s: float = LEASE_S, wait_s: float | None = None) -> None:
+        super().__init__(Database(path, _SCHEMA, VERSION, _MIGRATIONS, BUSY_TIMEOUT_S if wait_s is None else wait_s), lease_s)
 
     def close(self) -> None:
         self._database.close()

@@ -87,12 +87,12 @@ class Workspace:
         draft.write_text(json.dumps({"catalogue": url}) + "\n", encoding="utf-8")
         draft.replace(self.settings_path)
 
-    def open_catalogue(self, *, lease_s: float = LEASE_S) -> Catalogue:
-        """Opens the catalogue. Raises NotFound when neither the workspace nor a URL of its catalogue exists, or when a workspace with scenes or
-        renderings has lost its catalogue."""
+    def open_catalogue(self, *, lease_s: float = LEASE_S, wait_s: float | None = None) -> Catalogue:
+        """Opens the catalogue. `wait_s`: how long a call may wait for the database, by default as long as a restart of it takes. Raises NotFound
+        when neither the workspace nor a URL of its catalogue exists, or when a workspace with scenes or renderings has lost its catalogue."""
         url = self.find_catalogue_url()
         if url is not None:
-            return open_catalogue(url, lease_s=lease_s)
+            return open_catalogue(url, lease_s=lease_s, wait_s=wait_s)
         if not self.root.is_dir():
             raise NotFound(f"no workspace at {self.root}: create a scene first with map3d create-scene, or name another folder with --workspace")
         if not self.catalogue_path.exists() and ((self.root / "scenes").is_dir() or (self.root / "renderings").is_dir()):
@@ -100,4 +100,4 @@ class Workspace:
                 f"{self.catalogue_path}: no such file, though the workspace has scenes or renderings; restore it from a backup, "
                 f"or name the catalogue in the environment variable {CATALOGUE_VARIABLE}"
             )
-        return open_catalogue(str(self.catalogue_path), lease_s=lease_s)
+        return open_catalogue(str(self.catalogue_path), lease_s=lease_s, wait_s=wait_s)

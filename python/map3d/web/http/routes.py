@@ -18,13 +18,15 @@ View = TypeVar("View", bound=Callable[..., Response])
 
 @dataclass(frozen=True)
 class Rule:
-    """`name`: that of the table and that of the view function. `view` gets the parameters of the path, and returns the response."""
+    """`name`: that of the table and that of the view function. `view` gets the parameters of the path, and returns the response. `is_file`: it asks
+    nothing but the server's own files, so it has threads that never wait for the catalogue."""
 
     name: str
     method: str
     path: str
     view: Callable[..., Response]
     most_bytes: int
+    is_file: bool = False
 
     @property
     def reads_body(self) -> bool:
@@ -52,14 +54,14 @@ class Routes:
     def __iter__(self) -> Iterator[Rule]:
         return iter(self._rules)
 
-    def get(self, path: str) -> Callable[[View], View]:
-        return lambda view: self.add("GET", path, view)
+    def get(self, path: str, is_file: bool = False) -> Callable[[View], View]:
+        return lambda view: self.add("GET", path, view, is_file=is_file)
 
     def post(self, path: str, most_bytes: int = MOST_BYTES) -> Callable[[View], View]:
         return lambda view: self.add("POST", path, view, most_bytes)
 
-    def add(self, method: str, path: str, view: View, most_bytes: int = MOST_BYTES) -> View:
+    def add(self, method: str, path: str, view: View, most_bytes: int = MOST_BYTES, is_file: bool = False) -> View:
         """Raises TypeError for a write without a guard."""
         check_guarded(path, view, method)
-        self._rules.append(Rule(f"{self._name}.{view.__name__}", method, self._prefix + path, view, most_bytes))
+        self._rules.append(Rule(f"{self._name}.{view.__name__}", method, self._prefix + path, view, most_bytes, is_file))
         return view

@@ -98,19 +98,19 @@ def preview(rendering: str) -> Response:
     return document(picture, "image/jpeg")
 
 
-@pages.get("/view/{rendering}/{file:path}")
+@pages.get("/view/{rendering}/{file:path}", is_file=True)
 def viewer_file(rendering: str, file: str) -> Response:
-    catalogue().rendering(check_name(rendering, "rendering"))
+    """Returns a file of the viewer, which is the same for all renderings."""
     return file_response(viewer_folder(), file)
 
 
-@pages.get("/favicon.ico")
-@pages.get("/favicon.svg")
+@pages.get("/favicon.ico", is_file=True)
+@pages.get("/favicon.svg", is_file=True)
 def icon() -> Response:
     return file_response(STATIC, request()["path"][1:], ICON_MAX_AGE_S)
 
 
-@pages.get("/static/{file:path}")
+@pages.get("/static/{file:path}", is_file=True)
 def static(file: str) -> Response:
     return file_response(STATIC, file)
 

@@ -110,7 +110,7 @@ class App:
     async def close(self) -> None:
         """Answers the requests that wait for a thread, then closes all. Threads hand their responses to this event loop."""
         loop = asyncio.get_running_loop()
-        await loop.run_in_executor(None, self.views.threads.shutdown)
+        await loop.run_in_executor(None, self.views.close)
         await self.tiles.close()
         await self.uploads.close()
         await self.portrayal.close()

@@ -17,6 +17,7 @@ from granian.constants import HTTPModes, Interfaces
 from granian.http import HTTP1Settings
 from granian.log import LogLevels
 from granian.server import Server
+from granian.server.common import AbstractServer
 
 from map3d.catalogue import Workspace
 from map3d.errors import BadRequest, Map3dError
@@ -34,6 +35,10 @@ MOST_CONNECTIONS: Final = 16_384
 HEADER_TIMEOUT_MS: Final = 10_000
 """A client has this time to send the head of a request, and to begin the next one on the same connection."""
 _OTHER_FILES: Final = 512
+_PAUSES_S: Final = (1.0, 30.0)
+"""First and longest pause before web processes that die within seconds are started again."""
+_STEADY_S: Final = 60.0
+"""A server that ran for this long starts again after the first pause."""
 
 log: Final = logging.getLogger("map3d.web")
 
@@ -60,10 +65,38 @@ def serve(
     check_workspace(Workspace(workspace))
     configure_logs(chosen_settings.log_format, access=chosen_settings.access_log)
     chosen = find_port(host, port)
-    server = Server(
+    threading.Thread(target=_announce, args=(host, chosen, on_ready), daemon=True).start()
+    with _metrics_folder(chosen_settings) as folder:
+        load = partial(_load, workspace.absolute(), chosen_settings, reload_settings, folder, os.getpid(), dict(parts or {}))
+        _serve_always(lambda: _make_server(host, chosen, workers, chosen_settings.drain_s), load)
+
+
+def _serve_always(make_server: Callable[[], AbstractServer[Any]], load: Callable[[], App]) -> None:
+    """Serves until interrupted. granian starts a process that dies again, and gives up when it dies twice within seconds; then all start again after
+    a pause that grows while that goes on."""
+    pause_s = _PAUSES_S[0]
+    while True:
+        server, start_s = make_server(), time.monotonic()
+        try:
+            server.serve(target_loader=load, wrap_loader=False)
+            return
+        except SystemExit:
+            if server.interrupt_signal or not server.interrupt_children:
+                raise
+        if time.monotonic() - start_s > _STEADY_S:
+            pause_s = _PAUSES_S[0]
+        log.error("web processes die within seconds; they are started again in %g s", pause_s)
+        server.main_loop_interrupt.clear()
+        if server.main_loop_interrupt.wait(pause_s) and server.interrupt_signal:
+            return
+        pause_s = min(2 * pause_s, _PAUSES_S[1])
+
+
+def _make_server(host: str, port: int, workers: int, drain_s: int) -> AbstractServer[Any]:
+    return Server(
         target="map3d",
         address=host,
-        port=chosen,
+        port=port,
         interface=Interfaces.ASGI,
         workers=workers,
         http=HTTPModes.http1,
@@ -73,12 +106,8 @@ def serve(
         http1_settings=HTTP1Settings(header_read_timeout=HEADER_TIMEOUT_MS),
         log_level=LogLevels.warning,
         respawn_failed_workers=True,
-        workers_kill_timeout=chosen_settings.drain_s,
+        workers_kill_timeout=drain_s,
     )
-    threading.Thread(target=_announce, args=(host, chosen, on_ready), daemon=True).start()
-    with _metrics_folder(chosen_settings) as folder:
-        load = partial(_load, workspace.absolute(), chosen_settings, reload_settings, folder, os.getpid(), dict(parts or {}))
-        server.serve(target_loader=load, wrap_loader=False)
 
 
 @contextmanager

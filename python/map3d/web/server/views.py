@@ -24,6 +24,7 @@ from map3d.web.http.session_cookie import set_session
 from map3d.web.server.error_pages import error_response
 
 THREADS: Final = 8
+FILE_THREADS: Final = 2
 
 View = Callable[[], Response]
 Result = TypeVar("Result")
@@ -36,6 +37,7 @@ class Views:
         self.site, self.rules = site, sorted(rules, key=lambda rule: rule.order)
         self.bodies = Bodies()
         self.threads = ThreadPoolExecutor(THREADS, thread_name_prefix="views")
+        self.file_threads = ThreadPoolExecutor(FILE_THREADS, thread_name_prefix="files")
         by_path: dict[str, dict[str, Rule]] = {}
         for rule in self.rules:
             by_path.setdefault(rule.path, {})[rule.method] = rule
@@ -47,7 +49,8 @@ class Views:
         if has_body(scope):
             response = await self._receive(request, receive, view, rule)
         else:
-            response = await self._run(_respond, request, view)
+            threads = self.file_threads if rule is not None and rule.is_file else self.threads
+            response = await asyncio.get_running_loop().run_in_executor(threads, _respond, request, view)
         await response(scope, receive, send)
 
     async def _receive(self, request: Request, receive: Receive, view: View, rule: Rule | None) -> Response:
@@ -66,6 +69,11 @@ class Views:
         if error is not None or wanted is None:
             response.headers["Connection"] = "close"
         return response
+
+    def close(self) -> None:
+        """Answers the requests that wait for a thread."""
+        self.file_threads.shutdown()
+        self.threads.shutdown()
 
     async def _run(self, function: Callable[..., Result], *arguments: Any) -> Result:
         return await asyncio.get_running_loop().run_in_executor(self.threads, function, *arguments)
