@@ -5,7 +5,7 @@ from html import unescape
 from html.parser import HTMLParser
 
 from map3d.lifecycle.create_rendering import create_rendering
-from map3d.requests import AddFiles, CreateRendering, CreateScene, Publish
+from map3d.requests import AddFiles, ChangeRendering, CreateRendering, CreateScene, Publish
 from map3d.requests.param import fields_of
 from map3d.web.studio.forms import FORMS, more_fields
 from tests.cli.towns import house
@@ -44,7 +44,8 @@ def test_forms_have_every_field(town):
     request = CreateRendering(scene="town", name="r", levels=1)
     create_rendering(town.workspace, catalogue, request)
     catalogue.close()
-    pages = {CreateScene: "scenes/new", AddFiles: "scenes/town", CreateRendering: "scenes/town/renderings/new", Publish: "renderings/r"}
+    changes = {Publish: "renderings/r", ChangeRendering: "renderings/r"}
+    pages = {CreateScene: "scenes/new", AddFiles: "scenes/town", CreateRendering: "scenes/town/renderings/new"} | changes
     assert set(pages) == set(FORMS)
     for request, path in pages.items():
         text = unescape(town.get(f"/studio/{path}").text)
