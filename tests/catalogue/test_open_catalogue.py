@@ -97,3 +97,12 @@ def test_unknown_url_is_refused(url: str) -> None:
     with pytest.raises(BadRequest, match="mongodb://HOST") as caught:
         open_catalogue(url)
     assert PASSWORD not in str(caught.value)
+
+
+def test_a_new_file_is_for_its_owner_alone(tmp_path: Path) -> None:
+    path = tmp_path / "catalogue.sqlite"
+    open_catalogue(str(path)).close()
+    assert path.stat().st_mode & 0o777 == 0o600
+    path.chmod(0o640)
+    open_catalogue(str(path)).close()
+    assert path.stat().st_mode & 0o777 == 0o640, "the owner's choice stays"

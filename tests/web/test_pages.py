@@ -16,6 +16,7 @@ from map3d.registry import NewObject, Registry
 from map3d.tiles import viewer_files
 from map3d.web import create_app
 from map3d.web.http.http_errors import status_of
+from map3d.web.http.settings import ServerSettings
 from tests.web.conftest import Client
 from tests.web.workspaces import rendering_record
 
@@ -289,6 +290,13 @@ def test_no_page_has_inline_script_or_style(client, built_viewer):
         assert "unsafe" not in policy
         assert client.get(path).headers["x-content-type-options"] == "nosniff"
     assert not re.search(r"<style|style=|<script(?![^>]*src)| on\w+=", client.get("/renderings").text)
+
+
+def test_maps_may_be_framed_and_other_pages_only_by_this_server(workspace, built_viewer):
+    client = Client(create_app(workspace, ServerSettings(frame_ancestors="https://example.org")))
+    ancestors = {path: client.get(path).headers["content-security-policy"].rpartition("frame-ancestors ")[2] for path in ("/view/tea/", "/sign-in")}
+    assert ancestors == {"/view/tea/": "https://example.org", "/sign-in": "'self'"}
+    client.close()
 
 
 def test_the_viewers_page_and_files_are_served(client, built_viewer):

@@ -1,6 +1,7 @@
 """What an operator relies on: readiness, metrics, logs, reload and drain."""
 
 import json
+import logging
 import os
 import re
 import shutil
@@ -21,6 +22,7 @@ from map3d.web import create_app
 from map3d.web.http import health
 from map3d.web.http.settings import ServerSettings
 from map3d.web.server import health_route
+from map3d.web.server.logs import TextFormatter
 from map3d.web.server.metrics import COUNTERS, ROUTES, Metrics, render_metrics
 from map3d.web.server.serve import find_port
 from tests.web.conftest import Client
@@ -256,6 +258,14 @@ def test_running_requests_are_answered_after_sigterm(start):
         for one in running:
             assert one.recv(65536).startswith(b"HTTP/1.1 403"), "the whole request has reached the app"
     assert server.process.wait(WAIT_S) == 0
+
+
+def test_a_message_stays_one_line():
+    record = logging.makeLogRecord(
+        {"name": "map3d", "levelname": "ERROR", "msg": "no scene %r, %s", "args": ("a", "b\n2026 INFO forged\u2028\x1b[2J")}
+    )
+    text = TextFormatter().format(record)
+    assert text.endswith("ERROR map3d: no scene 'a', b\\n2026 INFO forged\\u2028\\x1b[2J")
 
 
 def test_web_processes_that_die_again_and_again_are_started_again(start):

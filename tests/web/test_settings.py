@@ -54,6 +54,7 @@ def test_the_environment_is_before_the_file_and_options_are_before_both(config, 
         ("on_demand_quota_gb", "0", "greater than 0"), ("on_demand_quota_gb", "NaN", "greater than 0"),
         ("on_demand_quota_gb", "-1", "greater than 0"),
         ("trusted_proxies", "proxy", "addresses and networks"),
+        ("frame_ancestors", "example.org", "such as https://example.org"), ("frame_ancestors", "*; script-src *", "such as https://example.org"),
         ("metrics", "9464", "HOST:PORT"), ("metrics", "x:y", "0 to 65535"), ("public_url", "maps.example", "https://example.org/maps"),
     ],
 )  # fmt: skip

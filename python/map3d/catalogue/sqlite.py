@@ -1,8 +1,10 @@
 """The catalogue in one SQLite file: scenes, assets, renderings. Jobs, operations and accounts are in files of their own."""
 
 import json
+import os
 import sqlite3
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, Self
@@ -52,9 +54,11 @@ _MIGRATIONS: Final = {
 
 
 class SqliteCatalogue(SqliteOperations, SqliteAccounts):
-    """Implements `Catalogue`; creates the file when it does not exist, and migrates an older one."""
+    """Implements `Catalogue`; migrates an older file. A new one is for its owner alone, since it has hashes of passwords."""
 
     def __init__(self, path: Path, *, lease_s: float = LEASE_S, wait_s: float | None = None) -> None:
+        with suppress(OSError):  # a file that exists stays as it is; SQLite names other reasons
+            os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600))
         super().__init__(Database(path, _SCHEMA, VERSION, _MIGRATIONS, BUSY_TIMEOUT_S if wait_s is None else wait_s), lease_s)
 
     def close(self) -> None:

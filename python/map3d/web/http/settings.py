@@ -1,6 +1,7 @@
 """The settings of the server: command line before environment before configuration file before defaults (docs/server.md)."""
 
 import os
+import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ CONFIG_VARIABLE: Final = "MAP3D_CONFIG"
 PREFIX: Final = "MAP3D_"
 DEFAULT_CACHE_BYTES: Final = 128 << 20
 LOG_FORMATS: Final = ("text", "json")
+_FRAME: Final = re.compile(r"\*|'self'|'none'|https?://(\*\.)?[\w.-]+(:\d+)?", re.ASCII)
 _TRUE, _FALSE = ("1", "true", "yes", "on"), ("0", "false", "no", "off")
 
 
@@ -25,7 +27,8 @@ class ServerSettings:
 
     `cache_bytes`: size of the memory cache of tiles in each process. `on_demand`: None if tiles are not rendered when they are asked for. `metrics`:
     host and port that serve Prometheus metrics, None for nowhere. `drain_s`: how long running requests may take after a signal to stop.
-    `trusted_proxies`: those whose X-Forwarded-For names the client, and whose X-Forwarded-Proto its scheme.
+    `trusted_proxies`: those whose X-Forwarded-For names the client, and whose X-Forwarded-Proto its scheme. `frame_ancestors`: pages that may show
+    maps in a frame, as in a content security policy.
     """
 
     public_url: str | None = None
@@ -39,6 +42,7 @@ class ServerSettings:
     metrics: tuple[str, int] | None = None
     drain_s: int = 30
     trusted_proxies: tuple[Network, ...] = THIS_HOST
+    frame_ancestors: str = "*"
 
 
 @dataclass(frozen=True)
@@ -160,6 +164,13 @@ def _networks(value: Any) -> tuple[Network, ...]:
     return parse_networks(", ".join(map(str, value)) if isinstance(value, list) else str(value))
 
 
+def _frames(value: Any) -> str:
+    sources = str(value).split()
+    if not sources or not all(_FRAME.fullmatch(source) for source in sources):
+        raise ValueError("*, 'self', 'none', or origins with spaces between them, such as https://example.org https://*.example.net")
+    return " ".join(sources)
+
+
 def _address(value: Any) -> tuple[str, int]:
     host, _, port = str(value).rpartition(":")
     if not host:
@@ -195,6 +206,9 @@ SETTINGS: Final = (
         _networks,
         "127.0.0.0/8, ::1",
         "addresses and networks of proxies, whose X-Forwarded-For and X-Forwarded-Proto name the client's address and scheme",
+    ),
+    Setting(
+        "frame_ancestors", _frames, "*", "pages that may show maps in a frame: * for all, 'self', 'none', or origins such as https://example.org"
     ),
     Setting("drain_s", _integer(1, 3600), "30", "seconds that running requests may take after a signal to stop or reload"),
 )

@@ -8,6 +8,8 @@ from datetime import UTC, datetime
 from typing import Any, Final
 
 ACCESS: Final = logging.getLogger("map3d.access")
+_ESCAPES: Final = {code: ascii(chr(code))[1:-1] for code in (*range(32), 127, 0x85, 0x2028, 0x2029)}
+"""Characters that end a line or control a terminal → how they are written."""
 _NAMES: Final = ("map3d", "_granian")
 
 
@@ -31,6 +33,11 @@ class TextFormatter(logging.Formatter):
     def __init__(self) -> None:
         super().__init__("%(asctime)sZ %(levelname)s %(name)s: %(message)s", "%Y-%m-%dT%H:%M:%S")
         self.converter = time.gmtime
+
+    def formatMessage(self, record: logging.LogRecord) -> str:
+        """Messages may have names that users chose; each stays one line."""
+        record.message = record.message.translate(_ESCAPES)
+        return super().formatMessage(record)
 
     def format(self, record: logging.LogRecord) -> str:
         fields = getattr(record, "fields", {})

@@ -73,7 +73,7 @@ def serve(
 
 def _serve_always(make_server: Callable[[], AbstractServer[Any]], load: Callable[[], App]) -> None:
     """Serves until interrupted. granian starts a process that dies again, and gives up when it dies twice within seconds; then all start again after
-    a pause that grows while that goes on."""
+    a pause that grows while that happens."""
     pause_s = _PAUSES_S[0]
     while True:
         server, start_s = make_server(), time.monotonic()

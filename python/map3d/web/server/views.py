@@ -116,5 +116,5 @@ def _respond(request: Request, view: View) -> Response:
             response = error_response(error)
         if request.new_session is not None:
             set_session(response, request.new_session)
-        response.raw_headers += page_headers(request["path"])
+        response.raw_headers += page_headers(request["path"], request.site.settings.frame_ancestors)
         return response
