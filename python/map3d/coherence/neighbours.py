@@ -4,7 +4,7 @@ Bases are compared in cells: the median of one file with those of other files in
 *level*; of the levels that touch each other, the one with the most objects is right, unless what explains the distance says otherwise.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -64,7 +64,7 @@ class _Pair:
         """From the bases of the other file to those of the one."""
         return robust_middle(self.one - self.other)[0]
 
-    @property
+    @cached_property
     def contradicts(self) -> bool:
         """Whether the distance is more than a slope explains."""
         metres, deviation = robust_middle(self.one - self.other)
@@ -75,36 +75,39 @@ class _Pair:
         return _Pair(self.other, self.one, self.apart_m, self.least_m)
 
 
+_Touched = Mapping[int, Mapping[int, _Pair]]
+"""File → each other file that it touches → their heights, those of the first file as `one`."""
+
+
 def compare_files(files: Sequence[FileBases], geoid: GeoidHeight) -> list[FileDifference]:
     """Returns the files that contradict those beside them, in their order."""
     pairs = dict(_pairs(files))
     if not any(pair.contradicts for pair in pairs.values()):
         return []
     levels = _levels(len(files), pairs)
+    touched = _both_ways(pairs)
     found: list[FileDifference] = []
     for group in _touching(levels, pairs):
-        found += _of_group(files, pairs, group, geoid)
+        found += _of_group(files, touched, group, geoid)
     return sorted(found, key=lambda difference: difference.file)
 
 
-def _of_group(
-    files: Sequence[FileBases], pairs: Mapping[tuple[int, int], _Pair], offsets: Mapping[int, float], geoid: GeoidHeight
-) -> Iterator[FileDifference]:
+def _of_group(files: Sequence[FileBases], touched: _Touched, offsets: Mapping[int, float], geoid: GeoidHeight) -> Iterator[FileDifference]:
     """Judges files that touch each other. `offsets`: file → metres from the first of them."""
     right_m = _right_level(files, offsets)
-    wrong = [number for number, metres in offsets.items() if not _is_same(metres, right_m)]
-    right = [number for number in offsets if number not in wrong]
-    kinds = {number: _kind(files, pairs, number, right, geoid) for number in wrong}
+    right = {number for number, metres in offsets.items() if _is_same(metres, right_m)}
+    wrong = offsets.keys() - right
+    kinds = {number: _kind(files, touched[number], number, right, geoid) for number in wrong}
     known = {kind for kind in kinds.values() if kind is not None}
     if known and known <= set(GROUND_KINDS) and not any(files[number].is_right for number in right):
         wrong, right = right, wrong
-        kinds = {number: _kind(files, pairs, number, right, geoid) for number in wrong}
+        kinds = {number: _kind(files, touched[number], number, right, geoid) for number in wrong}
         right_m = float(np.median([offsets[number] for number in right]))
-    for number in wrong:
+    for number in sorted(wrong):
         metres = offsets[number] - right_m
         alike = (kind for other, kind in kinds.items() if kind is not None and _is_same(offsets[other] - right_m, metres))
         kind = kinds[number] or next(alike, None) or _kind_of_distance(files[number].bases[:, 2], metres)
-        yield FileDifference(number, _beside(pairs, number, right), kind, metres)
+        yield FileDifference(number, _beside(touched[number], right), kind, metres)
 
 
 def _kind_of_distance(base: Floats, metres: float) -> str:
@@ -116,49 +119,62 @@ def _kind_of_distance(base: Floats, metres: float) -> str:
 
 def _right_level(files: Sequence[FileBases], offsets: Mapping[int, float]) -> float:
     """Returns the offset of the files that fit the terrain, else of those whose unit is known, else of those with the most objects."""
+    levels: dict[float, list[int]] = {}
+    for number, metres in offsets.items():
+        levels.setdefault(metres, []).append(number)
 
-    def trust(number: int) -> tuple[bool, bool, int, int]:
-        same = [files[other] for other, metres in offsets.items() if _is_same(metres, offsets[number])]
-        return any(file.is_right for file in same), not all(file.is_guessed for file in same), sum(len(file.bases) for file in same), -number
+    def trust(metres: float) -> tuple[bool, bool, int, int]:
+        same = [files[number] for other, numbers in levels.items() if _is_same(other, metres) for number in numbers]
+        size = sum(len(file.bases) for file in same)
+        return any(file.is_right for file in same), not all(file.is_guessed for file in same), size, -min(levels[metres])
 
-    return offsets[max(offsets, key=trust)]
+    return max(levels, key=trust)
 
 
 def _is_same(one_m: float, other_m: float) -> bool:
     return abs(one_m - other_m) <= max(TOLERANCE_M, SAME_LEVEL * max(abs(one_m), abs(other_m)))
 
 
-def _kind(files: Sequence[FileBases], pairs: Mapping[tuple[int, int], _Pair], number: int, right: Sequence[int], geoid: GeoidHeight) -> str | None:
+def _kind(files: Sequence[FileBases], touched: Mapping[int, _Pair], number: int, right: Set[int], geoid: GeoidHeight) -> str | None:
     """Returns what explains the distance of a file from the right ones that it touches; None if it touches none."""
-    touched = [pair for other in right if (pair := _pair(pairs, number, other)) is not None]
-    if not touched:
+    pairs = [pair for other, pair in sorted(touched.items()) if other in right]
+    if not pairs:
         return None
-    base, ground = (np.concatenate(values) for values in zip(*((pair.one, pair.other) for pair in touched), strict=True))
+    base, ground = (np.concatenate(values) for values in zip(*((pair.one, pair.other) for pair in pairs), strict=True))
     if are_zero(ground) and not are_zero(base):
         return GROUND_KINDS[0]
     return find_kind(base, ground, is_guessed=files[number].is_guessed, geoid=geoid)
 
 
-def _beside(pairs: Mapping[tuple[int, int], _Pair], number: int, right: Sequence[int]) -> int:
+def _beside(touched: Mapping[int, _Pair], right: Set[int]) -> int:
     """Returns the right file that a file touches in most cells, the first one if it touches none."""
-    touched = {other: len(pair.one) for other in right if (pair := _pair(pairs, number, other)) is not None}
-    return max(touched, key=lambda other: (touched[other], -other), default=right[0])
+    cells = {other: len(pair.one) for other, pair in touched.items() if other in right}
+    return max(cells, key=lambda other: (cells[other], -other), default=min(right))
 
 
-def _pair(pairs: Mapping[tuple[int, int], _Pair], one: int, other: int) -> _Pair | None:
-    if (one, other) in pairs:
-        return pairs[one, other]
-    return pairs[other, one].turned if (other, one) in pairs else None
+def _both_ways(pairs: Mapping[tuple[int, int], _Pair]) -> _Touched:
+    found: dict[int, dict[int, _Pair]] = {}
+    for (one, other), pair in pairs.items():
+        found.setdefault(one, {})[other] = pair
+        found.setdefault(other, {})[one] = pair.turned
+    return found
 
 
 def _levels(count: int, pairs: Mapping[tuple[int, int], _Pair]) -> list[int]:
     """Returns for each file the first one of its level."""
-    firsts = list(range(count))
+    parents = list(range(count))
+
+    def first(number: int) -> int:
+        while parents[number] != number:
+            parents[number] = parents[parents[number]]
+            number = parents[number]
+        return number
+
     for (one, other), pair in pairs.items():
-        if not pair.contradicts and firsts[one] != firsts[other]:
-            kept, gone = sorted((firsts[one], firsts[other]))
-            firsts = [kept if first == gone else first for first in firsts]
-    return firsts
+        if not pair.contradicts:
+            kept, gone = sorted((first(one), first(other)))
+            parents[gone] = kept
+    return [first(number) for number in range(count)]
 
 
 def _touching(levels: Sequence[int], pairs: Mapping[tuple[int, int], _Pair]) -> Iterator[dict[int, float]]:
