@@ -13,11 +13,11 @@ GROUND_CLASSES: Final = (
     "terrain", "tinrelief", "relief_feature", "raster_relief", "breakline_relief", "masspoint_relief", "land_use", "water_body", "plant_cover",
     "road", "railway", "square", "track", "transportation_complex",
 )  # fmt: skip
-"""Classes of what lies under the objects that people look for."""
+"""Classes of the ground, on which the objects stand that people look for."""
 MAX_BOXES: Final = 20_000
-"""Of more objects, every n-th counts."""
+"""Largest number of objects that are read; with more, every n-th counts."""
 IN_VIEW: Final = 24
-"""Objects that the first picture shows, if there are so many."""
+"""Number of objects that the first picture shows, or all of fewer."""
 _CELLS: Final = 32
 """Along the longer side of the content; objects are counted in 3 × 3 of them."""
 _DENSE: Final = 0.25
@@ -37,7 +37,7 @@ class Opening:
 
 
 def read_objects_box(registry: Registry, content: Box) -> Box | None:
-    """Returns the box of all objects, local, as far as it lies within the content; None without objects."""
+    """Returns the box of all objects, local, as far as it lies within the content; None if there are none."""
     found = registry.union_box(GROUND_CLASSES)
     if found is None:
         return None
@@ -46,7 +46,7 @@ def read_objects_box(registry: Registry, content: Box) -> Box | None:
 
 
 def read_opening(registry: Registry, content: Box, position: Vec3 | None = None) -> Opening | None:
-    """Returns where the map of a scene opens, at `position` if that is decided; None without objects."""
+    """Returns where the map of a scene opens, at `position` if that is decided; None if there are no objects."""
     step = max(registry.greatest_id() // MAX_BOXES, 1)
     boxes = registry.sample_boxes(GROUND_CLASSES, step)
     return find_opening(boxes, content, max(IN_VIEW // step, 1), position)

@@ -17,7 +17,7 @@ const TRANSLATIONS = {
     perimeter: "Perimeter",
     elevation: "Elevation",
     offPlumb: "The points are not one above the other.",
-    pastEdge: "A point fell past an edge, onto what lies behind it.",
+    pastEdge: "A point fell past an edge, onto the surface behind it.",
   },
   de: {
     profile: "Höhenprofil",
@@ -32,7 +32,7 @@ const TRANSLATIONS = {
     perimeter: "Umfang",
     elevation: "Höhenlage",
     offPlumb: "Die Punkte liegen nicht übereinander.",
-    pastEdge: "Ein Punkt liegt neben einer Kante, auf dem, was dahinter ist.",
+    pastEdge: "Ein Punkt liegt neben einer Kante, auf der Fläche dahinter.",
   },
   fr: {
     profile: "Profil altimétrique",
@@ -47,7 +47,7 @@ const TRANSLATIONS = {
     perimeter: "Périmètre",
     elevation: "Altitude",
     offPlumb: "Les points ne sont pas l’un au-dessus de l’autre.",
-    pastEdge: "Un point est tombé à côté d’une arête, sur ce qui se trouve derrière.",
+    pastEdge: "Un point est tombé à côté d’une arête, sur la surface derrière.",
   },
 };
 

@@ -269,6 +269,6 @@ test("a height between points that are not one above the other is doubtful, and 
   await page.evaluate(() => (globalThis as unknown as Measuring).tool.clear());
   await page.mouse.click(at[0], at[1] - 4);
   await page.waitForFunction(() => (globalThis as unknown as Measuring).tool.corners[0]?.pastEdge);
-  expect(await warnings()).toEqual(["A point fell past an edge, onto what lies behind it."]);
+  expect(await warnings()).toEqual(["A point fell past an edge, onto the surface behind it."]);
   expect(problems).toEqual([]);
 });
