@@ -4,6 +4,7 @@ import type * as Offline from "../../src/offline";
 import { withDataTiles } from "../fixture/encodeDataTile";
 import { published } from "../fixture/folder";
 import { renderTown } from "../fixture/rendering";
+import { rows } from "./rows";
 import { TestBed } from "./testBed";
 import { OUT, resting } from "./browser";
 import { pixels, steady, type Global } from "./page";
@@ -232,13 +233,15 @@ const PHONE = {
   hasTouch: true,
   userAgent: devices["iPhone 14"].userAgent,
 };
-const rows: [string, BrowserContextOptions][] = [
-  ["desk", { viewport: { width: 1280, height: 800 } }],
-  ["phone", { ...PHONE, locale: "de-DE" }],
-  ["dark", { ...PHONE, colorScheme: "dark", locale: "fr-FR" }],
-];
+const PAGES = rows<[string, BrowserContextOptions]>(
+  [["phone", { ...PHONE, locale: "de-DE" }]],
+  [
+    ["desk", { viewport: { width: 1280, height: 800 } }],
+    ["dark", { ...PHONE, colorScheme: "dark", locale: "fr-FR" }],
+  ],
+);
 
-test.each(rows)("the page saves itself and the view for offline use: %s", async (name, options) => {
+test.each(PAGES)("the page saves itself and the view for offline use: %s", async (name, options) => {
   const { page, problems } = await bed.openPage(options, { maps: true });
   page.setDefaultTimeout(30_000);
   const open = async (): Promise<Buffer> => {

@@ -5,6 +5,7 @@ import type * as Print from "../../src/print";
 import { renderTown } from "../fixture/rendering";
 import { decodePng, type DecodedPng } from "../../src/core/png";
 import { ORIGIN } from "../fixture/town";
+import { rows } from "./rows";
 import { TestBed } from "./testBed";
 import { OUT } from "./browser";
 import { picture, settled, type Global } from "./page";
@@ -156,72 +157,72 @@ test("an overlay is drawn over the map and below the texts, in CSS pixels of the
 const DESK = { viewport: { width: 1280, height: 800 } };
 const PHONE = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true };
 
-test.each([
-  ["desk", DESK],
-  ["phone", PHONE],
-] as const)("%s: the page saves and prints the view with title, legend and attribution", async (name, options) => {
-  const { page, problems } = await bed.openPage({ ...options, acceptDownloads: true });
-  await page.addInitScript(() => {
-    window.print = () => {
-      document.title = "printed";
-    };
-  });
-  await page.goto(`${bed.server.origin}/?rendering=${bed.url("fine")}`);
-  await page.waitForSelector("#make-picture");
-  if (name === "phone") await page.locator("#more").tap();
-  await page.selectOption("#color-by", { label: "measuredHeight" });
-  await page.waitForSelector("#legend button");
-  if (name === "phone") await page.locator("#more").tap();
-  await page.locator("#make-picture").click();
-  await page.selectOption("#picture-size", { index: name === "desk" ? 0 : 1 });
-  await page.screenshot({ path: `${OUT}/${name}-picture.png` });
-  expect(await page.locator("#picture-note").textContent()).toBe(name === "desk" ? "1280 × 800 px" : "780 × 1688 px");
-  const [download] = await Promise.all([page.waitForEvent("download"), page.locator("#picture-save").click()]);
-  expect(download.suggestedFilename()).toBe("town-0-45.png");
-  await download.saveAs(`${OUT}/${name}-saved.png`);
-  expect(readFileSync(`${OUT}/${name}-saved.png`).readUInt32BE(16)).toBe(name === "desk" ? 1280 : 780);
-  await page.waitForSelector("#picture", { state: "hidden" });
-  if (name === "desk") {
-    // The saved picture fades towards the edge as the screen does.
-    const [saved, screen] = [
-      await decodePng(Uint8Array.from(readFileSync(`${OUT}/desk-saved.png`))),
-      await decodePng(Uint8Array.from(await page.screenshot())),
-    ];
-    const row = ({ width, channels, data }: DecodedPng): number[] =>
-      Array.from({ length: 70 }, (_, k) => data[channels * (450 * width + 850 + k)] ?? NaN);
-    const [a, b] = [row(saved), row(screen)];
-    expect(a.filter((value, k) => Math.abs(value - (b[k] ?? NaN)) <= 4).length).toBeGreaterThan(0.95 * a.length);
-    expect(new Set(a).size).toBeGreaterThan(8);
-    expect(await page.locator(".haze.shown").count()).toBe(1);
-  }
-  await page.locator("#make-picture").click();
-  await page.locator("#picture-print").click();
-  await page.waitForFunction(() => document.title === "printed");
-  await page.emulateMedia({ media: "print" });
-  await page.screenshot({ path: `${OUT}/${name}-print.png` });
-  const sheet = (await page.locator("#sheet").innerText()).replace(/\s+/g, " ");
-  for (const part of [
-    "A small town",
-    "measuredHeight",
-    "62",
-    "Made by hand",
-    "Coordinate system: ETRS89 / UTM zone 32N",
-    String(new Date().getFullYear()),
-  ])
-    expect(sheet).toContain(part);
-  // As after printing, when the sheet is removed.
-  await page.pdf({ path: `${OUT}/${name}-print.pdf`, preferCSSPageSize: true, printBackground: false });
-  await page.emulateMedia({ media: null });
-  expect(await page.locator("#sheet > *").count()).toBe(0);
-  // Stopped half-way: the dialog is closed, nothing is saved, and the export can be started again.
-  await page.locator("#make-picture").click();
-  await page.selectOption("#picture-size", { index: 3 });
-  await page.locator("#picture-save").click();
-  await page.waitForSelector("#picture-busy:not([hidden])");
-  await page.screenshot({ path: `${OUT}/${name}-picture-working.png` });
-  await page.keyboard.press("Escape");
-  await page.waitForSelector("#picture-busy", { state: "hidden" });
-  await page.locator("#make-picture").click();
-  expect(await page.locator("#picture-save").isEnabled()).toBe(true);
-  expect(problems).toEqual([]);
-});
+test.each(rows([["phone", PHONE]] as const, [["desk", DESK]] as const))(
+  "%s: the page saves and prints the view with title, legend and attribution",
+  async (name, options) => {
+    const { page, problems } = await bed.openPage({ ...options, acceptDownloads: true });
+    await page.addInitScript(() => {
+      window.print = () => {
+        document.title = "printed";
+      };
+    });
+    await page.goto(`${bed.server.origin}/?rendering=${bed.url("fine")}`);
+    await page.waitForSelector("#make-picture");
+    if (name === "phone") await page.locator("#more").tap();
+    await page.selectOption("#color-by", { label: "measuredHeight" });
+    await page.waitForSelector("#legend button");
+    if (name === "phone") await page.locator("#more").tap();
+    await page.locator("#make-picture").click();
+    await page.selectOption("#picture-size", { index: name === "desk" ? 0 : 1 });
+    await page.screenshot({ path: `${OUT}/${name}-picture.png` });
+    expect(await page.locator("#picture-note").textContent()).toBe(name === "desk" ? "1280 × 800 px" : "780 × 1688 px");
+    const [download] = await Promise.all([page.waitForEvent("download"), page.locator("#picture-save").click()]);
+    expect(download.suggestedFilename()).toBe("town-0-45.png");
+    await download.saveAs(`${OUT}/${name}-saved.png`);
+    expect(readFileSync(`${OUT}/${name}-saved.png`).readUInt32BE(16)).toBe(name === "desk" ? 1280 : 780);
+    await page.waitForSelector("#picture", { state: "hidden" });
+    if (name === "desk") {
+      // The saved picture fades towards the edge as the screen does.
+      const [saved, screen] = [
+        await decodePng(Uint8Array.from(readFileSync(`${OUT}/desk-saved.png`))),
+        await decodePng(Uint8Array.from(await page.screenshot())),
+      ];
+      const row = ({ width, channels, data }: DecodedPng): number[] =>
+        Array.from({ length: 70 }, (_, k) => data[channels * (450 * width + 850 + k)] ?? NaN);
+      const [a, b] = [row(saved), row(screen)];
+      expect(a.filter((value, k) => Math.abs(value - (b[k] ?? NaN)) <= 4).length).toBeGreaterThan(0.95 * a.length);
+      expect(new Set(a).size).toBeGreaterThan(8);
+      expect(await page.locator(".haze.shown").count()).toBe(1);
+    }
+    await page.locator("#make-picture").click();
+    await page.locator("#picture-print").click();
+    await page.waitForFunction(() => document.title === "printed");
+    await page.emulateMedia({ media: "print" });
+    await page.screenshot({ path: `${OUT}/${name}-print.png` });
+    const sheet = (await page.locator("#sheet").innerText()).replace(/\s+/g, " ");
+    for (const part of [
+      "A small town",
+      "measuredHeight",
+      "62",
+      "Made by hand",
+      "Coordinate system: ETRS89 / UTM zone 32N",
+      String(new Date().getFullYear()),
+    ])
+      expect(sheet).toContain(part);
+    // As after printing, when the sheet is removed.
+    await page.pdf({ path: `${OUT}/${name}-print.pdf`, preferCSSPageSize: true, printBackground: false });
+    await page.emulateMedia({ media: null });
+    expect(await page.locator("#sheet > *").count()).toBe(0);
+    // Stopped half-way: the dialog is closed, nothing is saved, and the export can be started again.
+    await page.locator("#make-picture").click();
+    await page.selectOption("#picture-size", { index: 3 });
+    await page.locator("#picture-save").click();
+    await page.waitForSelector("#picture-busy:not([hidden])");
+    await page.screenshot({ path: `${OUT}/${name}-picture-working.png` });
+    await page.keyboard.press("Escape");
+    await page.waitForSelector("#picture-busy", { state: "hidden" });
+    await page.locator("#make-picture").click();
+    expect(await page.locator("#picture-save").isEnabled()).toBe(true);
+    expect(problems).toEqual([]);
+  },
+);
