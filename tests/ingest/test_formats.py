@@ -106,12 +106,12 @@ def test_an_ascii_grid_may_have_wide_columns(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", sorted({suffix for format in RASTER_FORMATS for suffix in format.world_files}))
-def test_world_files_are_not_listed_as_ignored(tmp_path: Path, suffix: str) -> None:
+def test_world_files_are_listed_as_used(tmp_path: Path, suffix: str) -> None:
     write(tmp_path / "dem.tif", hills(4, 4))
     (tmp_path / f"dem{suffix}").write_text("1\n0\n0\n-1\n0\n0\n")
-    ignored: list[Path] = []
-    find_sources([tmp_path], on_note=lambda path, _: ignored.append(path))
-    assert ignored == []
+    notes: list[tuple[str, str]] = []
+    find_sources([tmp_path], on_note=lambda path, note: notes.append((path.name, note.code)))
+    assert notes == [(f"dem{suffix}", "used-beside")]
 
 
 @pytest.mark.parametrize(("name", "driver"), [("a.ecw", "ECW"), ("a.sid", "MrSID"), ("a.IMG", "HFA")])

@@ -187,7 +187,7 @@ def test_run_waits_while_the_catalogue_is_locked(town: Town, undisturbed: str) -
 
 
 def test_run_ends_clearly_when_the_catalogue_stays_locked_and_can_be_repeated(town: Town, undisturbed: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("map3d.database.BUSY_TIMEOUT_S", 0.2)
+    monkeypatch.setattr("map3d.catalogue.sqlite.BUSY_TIMEOUT_S", 0.2)
     impatient = open_town(town.workspace.root, LEASE_S)
     with locked(town.workspace.catalogue_path, 3.0), pytest.raises(StoreError, match=r"catalogue\.sqlite: cannot write: database is locked"):
         impatient.run()

@@ -52,7 +52,8 @@ def test_a_model_lies_where_its_offset_says_and_the_terrain_fits(tmp_path: Path)
     done, boxes = add(tmp_path, city)
     assert (done.failed, codes(done)) == ([], ["model-placed"])
     assert np.allclose(boxes["house"], BOX, atol=1e-3)  # type: ignore[arg-type]
-    assert [(Path(file).name, note.code) for file, note in done.ignored] == [("house_offset.xyz", "used-as-place")]
+    used = {Path(file).name: note.code for file, note in done.ignored}
+    assert used == {"house_offset.xyz": "used-as-place", "house_wkt.prj": "used-beside"}
 
 
 @pytest.mark.parametrize(("unit", "scale"), [("cm", 100.0), ("mm", 1000.0), ("ft", 1 / 0.3048), ("us-ft", 3937 / 1200), ("in", 1 / 0.0254)])

@@ -83,7 +83,7 @@ def textures_of(workspace: Workspace, name: str) -> int:
 def test_a_folder_is_imported_with_the_geometry_and_appearances_that_its_files_share(tmp_path: Path, workspace: Workspace) -> None:
     done = add(workspace, write_city(tmp_path / "city"))
     assert {one.asset: one.triangles for one in done.imported} == {"a": 4, "b": 2}
-    assert (done.failed, {note.code.partition("-as-")[0] for _, note in done.ignored}) == ([], {"used"})
+    assert (done.failed, {note.code.partition("-as-")[0] for _, note in done.ignored}) == ([], {"used", "used-beside"})
     assert (textures_of(workspace, "a"), textures_of(workspace, "b")) == (1, 0)
     (missing,) = (warned(one.report) for one in done.imported if one.asset == "b")
     assert [(one["code"], one["count"], one["example"]) for one in missing] == [("other-file-not-found", 1, "c.gml#gone")]
@@ -101,7 +101,7 @@ def test_libraries_may_be_packed_and_refer_to_others(tmp_path: Path, workspace: 
     tile.write_text(tile.read_text().replace("shapes.xml#", "shapes.gml.gz#"))
     done = add(workspace, city)
     assert {one.asset: one.triangles for one in done.imported} == {"a": 6, "b": 2}
-    assert (done.failed, {note.code.partition("-as-")[0] for _, note in done.ignored}) == ([], {"used"})
+    assert (done.failed, {note.code.partition("-as-")[0] for _, note in done.ignored}) == ([], {"used", "used-beside"})
 
 
 @pytest.mark.parametrize(

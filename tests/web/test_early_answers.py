@@ -142,7 +142,7 @@ def test_a_replaced_block_is_not_answered_from_memory(client, workspace, monkeyp
 
 def test_early_answers_are_counted(client, never_recheck):
     metrics = Metrics()
-    client.app.observer = Observer(metrics, access_log=False)
+    client.app.observer = Observer(metrics, access_log=False, proxies=())
     client.get(IMMUTABLE)
     hits = client.app.tiles.cache_hits
     counted = list(metrics.values)
@@ -154,7 +154,7 @@ def test_early_answers_are_counted(client, never_recheck):
 
 
 def test_with_a_log_all_requests_pass_the_event_loop(client, never_recheck):
-    client.app.observer = Observer(None, access_log=True)
+    client.app.observer = Observer(None, access_log=True, proxies=())
     client.get(IMMUTABLE)
     assert client.app.answer_early(scope_of(IMMUTABLE)) is None
 
