@@ -1,5 +1,7 @@
 // Runs one page in Chromium with software WebGL2. Arguments: the folder of playwright-core, a JSON document with the parameters of the script.
 // A script passes its actions to `runPage`, which prints their result as JSON, with `problems`: the errors and warnings of the page.
+import { resolve } from "node:path";
+
 const [folder, parametersJson] = process.argv.slice(2);
 
 const ARGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"];
@@ -9,7 +11,7 @@ export async function launch(library, hosts = {}) {
   const { chromium } = await import(`${library}/index.mjs`);
   const rules = Object.entries(hosts).map(([name, address]) => `MAP ${name} ${address}`);
   const args = rules.length > 0 ? [...ARGS, `--host-resolver-rules=${rules.join(",")}`] : ARGS;
-  return chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args });
+  return chromium.launch({ executablePath: resolve(import.meta.dirname, "../../viewer/test/browser/chromium.sh"), args });
 }
 
 /** Makes the viewer's page open at once, as in a session that has seen its opening. */

@@ -15,6 +15,7 @@ const hintOf = (kind: Kind): string =>
 export class Tools {
   readonly #view: Map3D;
   readonly #buttons: ReadonlyMap<Kind, HTMLElement>;
+  #entry: typeof import("./map3d-measure.module.js") | undefined;
   #tool: Measure | undefined;
   #kind: Kind | null = null;
   /** The kind that is chosen first. */
@@ -59,7 +60,8 @@ export class Tools {
     if (kind === null) return;
     this.#last = kind;
     try {
-      const entry = await import("./map3d-measure.module.js");
+      // Once loaded, another kind takes the clicks at once.
+      const entry = (this.#entry ??= await import("./map3d-measure.module.js"));
       if (this.#kind !== kind) return;
       const showResults = (): void => this.#showResults();
       this.#tool = new entry.measure({ kind })

@@ -15,7 +15,7 @@ const WAYS = {
 } as const;
 export type Way = keyof typeof WAYS;
 
-/** Opens Chromium with software WebGL2. Path: CHROMIUM, else Debian's. */
+/** Opens Chromium with software WebGL2. */
 async function openBrowser(way: Way): Promise<Browser> {
   const args = [
     "--no-sandbox",
@@ -29,7 +29,7 @@ async function openBrowser(way: Way): Promise<Browser> {
     ...WAYS[way].args,
   ];
   return chromium.launch({
-    executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
+    executablePath: resolve(import.meta.dirname, "chromium.sh"),
     headless: true,
     args,
     env: { ...process.env, ...WAYS[way].env },
