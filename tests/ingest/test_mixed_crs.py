@@ -119,6 +119,12 @@ def test_each_name_has_its_order_of_axes(tmp_path: Path) -> None:
     assert skipped(done.report) == {}
 
 
+def test_trees_lie_where_they_stand_not_where_their_prototypes_are_drawn(tmp_path: Path) -> None:
+    done, boxes = add(tmp_path, model(*(TREE.format(name=f"t{n}", srs="", point=f"{691030 + n} 5336010 510") for n in range(3))))
+    assert "Munich" in done.report["placing"]["place"]
+    assert np.allclose(boxes["t2"][0], [691032.0, 5336010.0, 510.0])
+
+
 def test_reference_points_are_in_their_own_crs(tmp_path: Path) -> None:
     x, y = Transformer.from_crs("EPSG:25832", GAUSS_KRUEGER, always_xy=True).transform(691050, 5336010)
     trees = (

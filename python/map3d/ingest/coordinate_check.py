@@ -144,9 +144,12 @@ class CoordinateCheck:
             self._axes_findings.append(finding("easting-zone-prefix", 1, f"{middle[0]:.10g} {middle[1]:.10g} is read as {read}"))
 
     def _positions(self, points: Points) -> Points:
-        """Returns the positions of the sample or the first ones of the file, whichever are more."""
+        """Returns the positions of the sample or the first ones of the file, whichever are more. Of the sample, those of prototypes do not count, which
+        have coordinates of their own around 0, 0."""
         rings = self._rings()
         sampled = np.concatenate([ring.points for ring in rings]) if rings else np.zeros((0, 3))
+        if not self._is_geographic:
+            sampled = sampled[np.abs(sampled[:, :2]).max(axis=1, initial=0.0) > NO_PLACE_M]
         chosen = points if len(points) >= len(sampled) else sampled
         finite: Points = chosen[np.isfinite(chosen).all(axis=1)][:SAMPLE]
         return finite
