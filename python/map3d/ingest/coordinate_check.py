@@ -144,8 +144,8 @@ class CoordinateCheck:
             self._axes_findings.append(finding("easting-zone-prefix", 1, f"{middle[0]:.10g} {middle[1]:.10g} is read as {read}"))
 
     def _positions(self, points: Points) -> Points:
-        """Returns the positions of the sample or the first ones of the file, whichever are more. Of the sample, those of prototypes do not count, which
-        have coordinates of their own around 0, 0."""
+        """Returns the positions of the sample or the first ones of the file, whichever are more. Of the sample, those of prototypes do not count,
+        which have coordinates of their own around 0, 0."""
         rings = self._rings()
         sampled = np.concatenate([ring.points for ring in rings]) if rings else np.zeros((0, 3))
         if not self._is_geographic:
