@@ -86,9 +86,10 @@ class _Pending:
 class PortrayalService:
     """One per process; threads may share it."""
 
-    def __init__(self, workspace: Workspace, *, pool: TracerPool | None = None, limit_bytes: int | None = None) -> None:
+    def __init__(self, workspace: Workspace, *, pool: TracerPool | None = None, limit_bytes: int | None = None, wait_s: float | None = None) -> None:
+        """`wait_s`: how long a request may wait for the catalogue, by default as long as a restart of it takes."""
         folder = workspace.root / FOLDER
-        self._catalogue = workspace.open_catalogue()
+        self._catalogue = workspace.open_catalogue(wait_s=wait_s)
         self._contents = ContentsReader(workspace, self._catalogue)
         self._state = ServiceState(folder / "service.sqlite")
         self._store = ViewStore(views_folder(workspace), store_limit_bytes() if limit_bytes is None else limit_bytes)

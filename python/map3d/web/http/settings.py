@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 from map3d.errors import BadRequest, NotFound
 from map3d.jobs.on_demand.worker import OnDemandSettings
 from map3d.web.http.clients import THIS_HOST, Network, parse_networks
+from map3d.web.http.headers import ANYWHERE
 
 CONFIG_VARIABLE: Final = "MAP3D_CONFIG"
 PREFIX: Final = "MAP3D_"
@@ -42,7 +43,7 @@ class ServerSettings:
     metrics: tuple[str, int] | None = None
     drain_s: int = 30
     trusted_proxies: tuple[Network, ...] = THIS_HOST
-    frame_ancestors: str = "*"
+    frame_ancestors: str = ANYWHERE
 
 
 @dataclass(frozen=True)
@@ -204,11 +205,11 @@ SETTINGS: Final = (
     Setting(
         "trusted_proxies",
         _networks,
-        "127.0.0.0/8, ::1",
+        ", ".join(map(str, THIS_HOST)),
         "addresses and networks of proxies, whose X-Forwarded-For and X-Forwarded-Proto name the client's address and scheme",
     ),
     Setting(
-        "frame_ancestors", _frames, "*", "pages that may show maps in a frame: * for all, 'self', 'none', or origins such as https://example.org"
+        "frame_ancestors", _frames, ANYWHERE, "pages that may show maps in a frame: * for all, 'self', 'none', or origins such as https://example.org"
     ),
     Setting("drain_s", _integer(1, 3600), "30", "seconds that running requests may take after a signal to stop or reload"),
 )

@@ -23,6 +23,7 @@ from map3d.web.http.headers import ANY_ORIGIN
 from map3d.web.http.http_errors import not_allowed, plain_error
 from map3d.web.http.public_url import root_url
 from map3d.web.http.settings import ServerSettings
+from map3d.web.http.shared_catalogue import WAIT_S
 
 PATH: Final = "/3dps"
 STRICT_PATH: Final = "/3dps/strict"
@@ -89,7 +90,7 @@ class PortrayalRoute:
         async with self._opening:
             if self._service is None:
                 loop = asyncio.get_running_loop()
-                self._service = await loop.run_in_executor(None, lambda: PortrayalService(self._workspace, pool=make_pool()))
+                self._service = await loop.run_in_executor(None, lambda: PortrayalService(self._workspace, pool=make_pool(), wait_s=WAIT_S))
             return self._service
 
 
